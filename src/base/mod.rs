@@ -1,0 +1,13 @@
+//! What every room stands on, and nothing that belongs to one of them.
+//!
+//! - [`ids`]: typed indices and the per-element containers that only they open;
+//! - [`progress`]: how long work reports and how it is interrupted, without knowing a terminal;
+//! - [`atomic`]: outputs that appear complete or not at all;
+//! - [`sparse`]: symmetric positive definite systems, with the symbolic factor kept between solves;
+//! - [`units`]: the few conversions and number formats that several rooms share.
+
+pub mod atomic;
+pub mod ids;
+pub mod progress;
+pub mod sparse;
+pub mod units;

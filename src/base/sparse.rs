@@ -1,0 +1,228 @@
+//! Symmetric positive definite systems whose pattern stays while their values change.
+//!
+//! [`Pattern`] is the lower triangle in compressed columns and gives every entry a *slot*; callers look their slots
+//! up once and then only write values. [`Cholesky`] orders and analyses the pattern once (faer, AMD ordering,
+//! supernodal where that pays) and factors into memory it keeps. One thread: the result does not depend on the
+//! number of processors.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
+    factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
+use faer::{Conj, MatMut, Par, Side};
+
+/// The pattern of a symmetric n × n matrix: its lower triangle, diagonal included, in compressed columns.
+#[derive(Clone, Debug)]
+pub struct Pattern {
+    symbolic: SymbolicSparseColMat<u32>,
+}
+
+impl Pattern {
+    /// The pattern with entries at `pairs` (in either order, repeats allowed) and on the whole diagonal.
+    /// Every index must be below `size`.
+    pub fn new(size: usize, pairs: impl IntoIterator<Item = (u32, u32)>) -> Self {
+        let mut entries: Vec<(u32, u32)> = pairs
+            .into_iter()
+            .map(|(i, j)| (i.min(j), i.max(j)))
+            .collect();
+        entries.extend((0..size as u32).map(|i| (i, i)));
+        entries.sort_unstable();
+        entries.dedup();
+        let mut col_ptr = vec![0u32; size + 1];
+        for &(col, _) in &entries {
+            col_ptr[col as usize + 1] += 1;
+        }
+        for col in 0..size {
+            col_ptr[col + 1] += col_ptr[col];
+        }
+        let rows = entries.into_iter().map(|(_, row)| row).collect();
+        Self {
+            symbolic: SymbolicSparseColMat::new_checked(size, size, col_ptr, None, rows),
+        }
+    }
+
+    /// The pattern of a matrix of `block` × `block` blocks: every entry of `self` becomes a full block.
+    pub fn expanded(&self, block: usize) -> Self {
+        let size = self.size();
+        let (ptr, rows) = (self.symbolic.col_ptr(), self.symbolic.row_idx());
+        let pairs = (0..size).flat_map(move |col| {
+            rows[ptr[col] as usize..ptr[col + 1] as usize]
+                .iter()
+                .flat_map(move |&row| {
+                    (0..block * block).map(move |k| {
+                        (
+                            row * block as u32 + (k / block) as u32,
+                            (col * block) as u32 + (k % block) as u32,
+                        )
+                    })
+                })
+        });
+        Self::new(size * block, pairs)
+    }
+
+    /// Rows (= columns) of the matrix.
+    pub fn size(&self) -> usize {
+        self.symbolic.nrows()
+    }
+
+    /// Stored entries: the length of the value array.
+    pub fn entries(&self) -> usize {
+        self.symbolic.row_idx().len()
+    }
+
+    /// Where the value of entry (i, j) stands in the value array; `None` if the pattern has no such entry.
+    pub fn slot(&self, i: usize, j: usize) -> Option<usize> {
+        let (col, row) = (i.min(j), i.max(j) as u32);
+        let (ptr, rows) = (self.symbolic.col_ptr(), self.symbolic.row_idx());
+        let (start, end) = (ptr[col] as usize, ptr[col + 1] as usize);
+        rows[start..end].binary_search(&row).ok().map(|k| start + k)
+    }
+}
+
+/// Why a factorisation failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FactorError {
+    /// A pivot was not positive: the matrix is singular or indefinite at this accuracy.
+    #[error("the linear system is not positive definite")]
+    NotPositiveDefinite,
+    /// The factor does not fit.
+    #[error("out of memory while factoring a linear system; use fewer triangles")]
+    OutOfMemory,
+}
+
+/// A Cholesky factor with its workspace; the symbolic part is computed once.
+pub struct Cholesky {
+    pattern: Pattern,
+    symbolic: SymbolicCholesky<u32>,
+    factor: Vec<f64>,
+    memory: MemBuffer,
+}
+
+impl Cholesky {
+    /// Orders and analyses the pattern. Nothing can be solved before [`Cholesky::factor`].
+    ///
+    /// # Errors
+    /// [`FactorError::OutOfMemory`].
+    pub fn new(pattern: Pattern) -> Result<Self, FactorError> {
+        let symbolic = factorize_symbolic_cholesky(
+            pattern.symbolic.as_ref(),
+            Side::Lower,
+            SymmetricOrdering::Amd,
+            CholeskySymbolicParams::default(),
+        )
+        .map_err(|_| FactorError::OutOfMemory)?;
+        let scratch = symbolic
+            .factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default())
+            .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+        let memory = MemBuffer::try_new(scratch).map_err(|_| FactorError::OutOfMemory)?;
+        let factor = vec![0.0; symbolic.len_val()];
+        Ok(Self {
+            pattern,
+            symbolic,
+            factor,
+            memory,
+        })
+    }
+
+    /// The pattern, for looking up slots.
+    pub fn pattern(&self) -> &Pattern {
+        &self.pattern
+    }
+
+    /// Factors the matrix whose entries are `values` (by slot).
+    ///
+    /// # Errors
+    /// [`FactorError::NotPositiveDefinite`]; the factor is then unusable until the next success.
+    pub fn factor(&mut self, values: &[f64]) -> Result<(), FactorError> {
+        let matrix = SparseColMatRef::new(self.pattern.symbolic.as_ref(), values);
+        self.symbolic
+            .factorize_numeric_llt(
+                &mut self.factor,
+                matrix,
+                Side::Lower,
+                LltRegularization::default(),
+                Par::Seq,
+                MemStack::new(&mut self.memory),
+                Default::default(),
+            )
+            .map(drop)
+            .map_err(|_| FactorError::NotPositiveDefinite)
+    }
+
+    /// Replaces `rhs` by the solution of the factored system.
+    pub fn solve(&mut self, rhs: &mut [f64]) {
+        let size = rhs.len();
+        LltRef::<'_, u32, f64>::new(&self.symbolic, &self.factor).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(rhs, size, 1),
+            Par::Seq,
+            MemStack::new(&mut self.memory),
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_laplacian_is_solved_again_after_its_values_change() {
+        let side = 20usize;
+        let at = |i: usize, j: usize| (i * side + j) as u32;
+        let mut pairs = Vec::new();
+        for i in 0..side {
+            for j in 0..side {
+                if i + 1 < side {
+                    pairs.push((at(i, j), at(i + 1, j)));
+                }
+                if j + 1 < side {
+                    pairs.push((at(i, j + 1), at(i, j)));
+                }
+            }
+        }
+        let mut solver = Cholesky::new(Pattern::new(side * side, pairs.clone())).unwrap();
+        for scale in [1.0, 7.0] {
+            let mut values = vec![0.0; solver.pattern().entries()];
+            let expected: Vec<f64> = (0..side * side).map(|i| (i as f64 * 0.37).sin()).collect();
+            let mut rhs = vec![0.0; side * side];
+            let mut add = |i: usize, j: usize, v: f64, rhs: &mut [f64]| {
+                values[solver.pattern().slot(i, j).unwrap()] += v;
+                rhs[i] += v * expected[j];
+                if i != j {
+                    rhs[j] += v * expected[i];
+                }
+            };
+            for i in 0..side * side {
+                add(i, i, 4.5 * scale, &mut rhs);
+            }
+            for &(i, j) in &pairs {
+                add(i as usize, j as usize, -scale, &mut rhs);
+            }
+            solver.factor(&values).unwrap();
+            solver.solve(&mut rhs);
+            let worst = rhs
+                .iter()
+                .zip(&expected)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
+            assert!(worst < 1e-12, "{worst:e}");
+        }
+        let negative = vec![-1.0; solver.pattern().entries()];
+        assert_eq!(
+            solver.factor(&negative),
+            Err(FactorError::NotPositiveDefinite)
+        );
+    }
+
+    #[test]
+    fn blocks_expand_to_full_blocks() {
+        let pattern = Pattern::new(3, [(2, 0)]).expanded(3);
+        assert_eq!(pattern.size(), 9);
+        assert!(pattern.slot(6, 2).is_some() && pattern.slot(2, 6).is_some());
+        assert!(pattern.slot(3, 0).is_none());
+        assert_eq!(pattern.entries(), 3 * 6 + 9);
+    }
+}

@@ -1,0 +1,89 @@
+//! The command line: one file a verb, each a thin caller of the library.
+//!
+//! Exit codes: 0 done, 1 the answer is no, 2 bad usage or bad input. Results go to standard output (`--json` for
+//! machines), everything else to standard error.
+
+mod terminal;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+pub use terminal::Terminal;
+
+/// From a surface to a verified, rehearsed cut.
+#[derive(Parser)]
+#[command(
+    name = "kagome",
+    version,
+    propagate_version = true,
+    max_term_width = 100
+)]
+struct Cli {
+    #[command(flatten)]
+    global: Global,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+/// Options that every verb takes.
+#[derive(Args, Clone, Debug)]
+pub struct Global {
+    /// Print the result as JSON on standard output
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// No progress and no remarks, only the result and errors
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+}
+
+#[derive(Subcommand)]
+enum Verb {}
+
+/// Why a verb did not end with "done".
+#[derive(Debug)]
+pub enum Failure {
+    /// The work was done and the answer is no: exit code 1. The text says what, where and what to do.
+    No(String),
+    /// The request or its input cannot be used: exit code 2.
+    Bad(String),
+}
+
+impl Failure {
+    /// Bad input, in the words of the error.
+    pub fn bad(error: impl std::fmt::Display) -> Self {
+        Self::Bad(error.to_string())
+    }
+}
+
+/// Runs the program with these arguments (the first is its name) and gives its exit code.
+pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Clap prints help and version through the same path, on standard output and with code 0.
+            let _ = error.print();
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    let terminal = Terminal::new(cli.global.quiet);
+    let _ = &terminal;
+    let result: Result<(), Failure> = match cli.verb {};
+    #[allow(unreachable_code)]
+    report(result)
+}
+
+fn report(result: Result<(), Failure>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::No(text)) => {
+            eprintln!("no: {text}");
+            ExitCode::from(1)
+        }
+        Err(Failure::Bad(text)) => {
+            eprintln!("error: {text}");
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! kagome: from a surface mesh to an auxetic sheet, cut and verified.
+
+pub mod base;
+pub mod cli;
+pub mod linkage;
+pub mod mesh;
