@@ -2,5 +2,6 @@
 
 pub mod base;
 pub mod cli;
+pub mod conformal;
 pub mod linkage;
 pub mod mesh;

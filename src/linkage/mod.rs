@@ -1,5 +1,185 @@
-//! Stage 3: the flat layout and a triangle lattice become a [`Linkage`].
+//! Stage 3: the flat layout and a triangle lattice become a [`Linkage`]: rigid triangles joined in pairs.
+//!
+//! [`build`] lays a lattice of edge L on the [`Layout`], with a vertex on the cone where there is one, keeps the
+//! triangles that lie wholly on the surface and are held by at least two others, cuts the seam along lattice lines,
+//! places every triangle flat and closed on the sheet, and lifts the linkage, opened as λ asks, back onto the surface.
+//! [`write_obj`] is the format that other programs read.
 
+mod clip;
+mod lattice;
+mod lift;
+mod obj;
+mod seam;
 mod types;
+mod walk;
 
+use nalgebra::{Point2, Point3};
+
+pub use lattice::Lattice;
+pub use lift::opening_turn;
+pub use obj::write_obj;
 pub use types::{Cell, Colour, Corner, Handedness, Hinge, Linkage, PointId, Triangle, TriangleId};
+
+use crate::base::progress::{Interrupted, Progress};
+use crate::conformal::Layout;
+use crate::mesh::Surface;
+
+/// How the lattice lies on the layout.
+#[derive(Clone, Copy, Debug)]
+pub struct LinkageOptions {
+    /// Triangle edge L, millimetres.
+    pub edge_mm: f64,
+    /// Direction of the lattice against the layout's X, radians.
+    pub orientation: f64,
+    /// Which of the two slit patterns.
+    pub handedness: Handedness,
+    /// Triangles to drop around the cone: 4 are those at it, 16 those and the ring around them.
+    pub remove_at_cone: usize,
+    /// Largest scale factor: the lift opens no farther.
+    pub sigma: f64,
+}
+
+/// A linkage with its start and what it cost.
+#[derive(Clone, Debug)]
+pub struct Built {
+    /// The linkage, with closed flat positions.
+    pub linkage: Linkage,
+    /// Where every point starts, on the surface, opened; by point.
+    pub start: Vec<Point3<f64>>,
+    /// Triangles that lay on the surface but hung by fewer than two others, or were not part of the largest piece.
+    pub lost: usize,
+    /// Triangles removed at the cone, as asked.
+    pub removed: usize,
+    /// Pairs of triangles that lie on one another on the sheet.
+    pub overlaps: Vec<(TriangleId, TriangleId)>,
+    /// Length of the seam in lattice edges; 0 without.
+    pub seam_edges: usize,
+}
+
+/// Why there is no linkage.
+#[derive(Debug, thiserror::Error)]
+pub enum LinkageError {
+    /// No triangle with enough neighbours fits.
+    #[error(
+        "no linkage fits: the triangle edge is {edge_mm:.2} mm, the flattened surface only {width_mm:.0} × {height_mm:.0} mm; ask for smaller triangles (--edge {suggestion_mm:.2} or --triangles 500) or a larger surface (--size)"
+    )]
+    NothingFits {
+        /// Edge asked for.
+        edge_mm: f64,
+        /// Layout's extent in X.
+        width_mm: f64,
+        /// Layout's extent in Y.
+        height_mm: f64,
+        /// An edge that would give some hundred triangles.
+        suggestion_mm: f64,
+    },
+    /// More triangles than this program handles.
+    #[error(
+        "an edge of {edge_mm} mm gives about {count:.0} triangles, more than {limit}: choose a larger --edge"
+    )]
+    TooMany {
+        /// Edge asked for.
+        edge_mm: f64,
+        /// Triangles it would give.
+        count: f64,
+        /// Largest number.
+        limit: usize,
+    },
+    /// The person asked to stop.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
+/// Largest number of triangles accepted. The solver's memory grows to a few gigabytes there.
+const MOST_TRIANGLES: usize = 200_000;
+
+/// Builds the linkage of a layout.
+///
+/// # Errors
+/// [`LinkageError`]: nothing fits, far too much fits, interruption.
+pub fn build(
+    surface: &Surface,
+    layout: &Layout,
+    options: &LinkageOptions,
+    progress: &dyn Progress,
+) -> Result<Built, LinkageError> {
+    let edge_mm = options.edge_mm;
+    let (area, (width_mm, height_mm)) = (layout.area_mm2(), extent(layout));
+    let triangle_area = 0.5 * lattice::HEIGHT * edge_mm * edge_mm;
+    let nothing = || LinkageError::NothingFits {
+        edge_mm,
+        width_mm,
+        height_mm,
+        suggestion_mm: (area / (500.0 * 0.5 * lattice::HEIGHT)).sqrt(),
+    };
+    if area / triangle_area > MOST_TRIANGLES as f64 {
+        return Err(LinkageError::TooMany {
+            edge_mm,
+            count: area / triangle_area,
+            limit: MOST_TRIANGLES,
+        });
+    }
+    let lattice = Lattice::new(edge_mm, options.orientation);
+    let laid = clip::lay(surface, layout, &lattice, edge_mm, progress)?;
+    let mut dropped = vec![false; laid.len()];
+    if !layout.cones.is_empty() {
+        for n in clip::nearest_to_origin(&laid, options.remove_at_cone) {
+            dropped[n] = true;
+        }
+    }
+    let removed = dropped.iter().filter(|d| **d).count();
+    let (kept, lost) = clip::core(&laid, |n| !dropped[n]);
+    if kept.is_empty() {
+        return Err(nothing());
+    }
+    progress.check()?;
+    let flat = seam::flatten(&kept, &lattice, middle(&kept));
+    let cells: Vec<Cell> = kept
+        .iter()
+        .zip(&flat.corners)
+        .map(|(place, corners)| Cell {
+            colour: place.colour,
+            flat: *corners,
+            neighbours: place.neighbours,
+        })
+        .collect();
+    let linkage = Linkage::assemble(edge_mm, options.handedness, &cells);
+    let start = lift::lift(surface, layout, &kept, &linkage, options.sigma);
+    let id = |t: usize| TriangleId(t as u32);
+    Ok(Built {
+        linkage,
+        start,
+        lost,
+        removed,
+        overlaps: flat.overlaps.iter().map(|&(a, b)| (id(a), id(b))).collect(),
+        seam_edges: flat.seam_edges,
+    })
+}
+
+/// Width and height of a layout, millimetres.
+fn extent(layout: &Layout) -> (f64, f64) {
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for p in layout.corners.iter().flatten() {
+        for k in 0..2 {
+            low[k] = low[k].min(p[k]);
+            high[k] = high[k].max(p[k]);
+        }
+    }
+    (high[0] - low[0], high[1] - low[1])
+}
+
+/// The triangle nearest to the mean centroid: most of the sheet then lies as it does on the layout.
+fn middle(laid: &[clip::Laid]) -> usize {
+    let centre = |l: &clip::Laid| {
+        Point2::from((l.corners[0].coords + l.corners[1].coords + l.corners[2].coords) / 3.0)
+    };
+    let mean = laid
+        .iter()
+        .map(|l| centre(l).coords)
+        .sum::<nalgebra::Vector2<f64>>()
+        / laid.len() as f64;
+    let distance = |n: usize| (centre(&laid[n]).coords - mean).norm();
+    (0..laid.len())
+        .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+        .unwrap_or(0)
+}

@@ -1,0 +1,422 @@
+//! The flat layout: the faces unfolded into the plane, with the scale factor λ that takes them back to the surface.
+//!
+//! Coordinates are millimetres on the closed sheet: X right, Y up, seen from outside. The chart is continuous except
+//! across the cut; there a [`Transition`] takes coordinates of one side to those of the other, so that one can walk
+//! across the seam. With a cone the chart's origin is the cone, and the transition a rotation about it by a multiple
+//! of 120°, exactly; without one the origin is the chart's centre of area.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::f64::consts::PI;
+
+use nalgebra::{Complex, ComplexField as _, Point2, Vector3};
+
+use super::{Cone, Metric};
+use crate::base::ids::{Id as _, Per};
+use crate::mesh::{FaceId, HalfedgeId, Surface, VertexId};
+
+/// A rigid motion of the plane: z ↦ `turn` · z + `shift`, with |turn| = 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transition {
+    /// Unit complex number: the rotation.
+    pub turn: Complex<f64>,
+    /// Translation, millimetres.
+    pub shift: Complex<f64>,
+}
+
+impl Transition {
+    /// The motion that moves nothing.
+    pub const IDENTITY: Self = Self {
+        turn: Complex::new(1.0, 0.0),
+        shift: Complex::new(0.0, 0.0),
+    };
+
+    /// Applies the motion to a point.
+    #[inline]
+    pub fn apply(&self, point: Point2<f64>) -> Point2<f64> {
+        let z = self.turn * Complex::new(point.x, point.y) + self.shift;
+        Point2::new(z.re, z.im)
+    }
+    /// `self` first, then `next`.
+    #[inline]
+    pub fn then(&self, next: &Self) -> Self {
+        Self {
+            turn: next.turn * self.turn,
+            shift: next.turn * self.shift + next.shift,
+        }
+    }
+    /// The motion back.
+    #[inline]
+    pub fn inverse(&self) -> Self {
+        let turn = self.turn.conj();
+        Self {
+            turn,
+            shift: -(turn * self.shift),
+        }
+    }
+}
+
+/// A flat chart of a surface.
+#[derive(Clone, Debug)]
+pub struct Layout {
+    /// Flat corners of every face, millimetres.
+    pub corners: Per<FaceId, [Point2<f64>; 3]>,
+    /// ln λ per vertex; λ is millimetres on the surface per millimetre on the closed sheet.
+    pub log_scale: Per<VertexId, f64>,
+    /// For each halfedge on the cut: from the chart coordinates of its face to those of its twin's face.
+    pub seam: BTreeMap<HalfedgeId, Transition>,
+    /// The cones, in the order given.
+    pub cones: Vec<Cone>,
+    /// The cut as it was unfolded, from the cone to the rim.
+    pub cut: Vec<HalfedgeId>,
+    /// Largest relative error of a flat edge length against the metric: how well the unfolding closed.
+    pub closure: f64,
+}
+
+/// The range of λ over a layout.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScaleSummary {
+    /// Smallest λ outside the cones' neighbourhoods.
+    pub min: f64,
+    /// Largest λ outside the cones' neighbourhoods.
+    pub max: f64,
+    /// Where the largest is.
+    pub max_vertex: VertexId,
+    /// Part of the surface's area with λ in [1, σ] for the σ asked about.
+    pub inside: f64,
+}
+
+impl Layout {
+    /// Unfolds a metric, cut open along `cut` (halfedges from the one cone outwards, or nothing for a disk without
+    /// cones). λ is normalised so that the metric's own lengths are millimetres; see [`Layout::rescaled`].
+    pub fn unfold(surface: &Surface, metric: &Metric, cones: &[Cone], cut: &[HalfedgeId]) -> Self {
+        let mut is_cut = Per::<HalfedgeId, bool>::filled(surface.faces().len() * 3, false);
+        for &h in cut {
+            is_cut[h] = true;
+            if let Some(twin) = surface.twin(h) {
+                is_cut[twin] = true;
+            }
+        }
+        let (wedge_of, wedges) = wedges(surface, &is_cut);
+        let mut place: Vec<Option<Point2<f64>>> = vec![None; wedges];
+        let mut visited = Per::<FaceId, bool>::filled(surface.faces().len(), false);
+        // From the middle outwards, so that rounding errors travel the shortest way.
+        let root = central_face(surface);
+        let lengths = metric.lengths(surface, root);
+        let w = wedge_of[root];
+        place[w[0]] = Some(Point2::origin());
+        place[w[1]] = Some(Point2::new(lengths[0], 0.0));
+        let mut queue = VecDeque::from([HalfedgeId::side(root, 0)]);
+        visited[root] = true;
+        while let Some(h) = queue.pop_front() {
+            let (face, k) = (h.face(), h.corner());
+            let w = wedge_of[face];
+            let lengths = metric.lengths(surface, face);
+            if let (Some(a), Some(b), None) =
+                (place[w[k]], place[w[(k + 1) % 3]], place[w[(k + 2) % 3]])
+            {
+                place[w[(k + 2) % 3]] = Some(apex(
+                    a,
+                    b,
+                    lengths[k],
+                    lengths[(k + 1) % 3],
+                    lengths[(k + 2) % 3],
+                ));
+            }
+            for side in 0..3 {
+                let across = HalfedgeId::side(face, side);
+                if let Some(twin) = surface.twin(across)
+                    && !is_cut[across]
+                    && !visited[twin.face()]
+                {
+                    visited[twin.face()] = true;
+                    queue.push_back(twin);
+                }
+            }
+        }
+        let corners: Per<FaceId, [Point2<f64>; 3]> = wedge_of
+            .iter()
+            .map(|w| w.map(|w| place[w].unwrap_or_else(Point2::origin)))
+            .collect();
+        let mut layout = Self {
+            corners,
+            log_scale: metric.u.iter().map(|u| -u).collect(),
+            seam: BTreeMap::new(),
+            cones: cones.to_vec(),
+            cut: cut.to_vec(),
+            closure: 0.0,
+        };
+        layout.closure = layout.closure_error(surface, metric);
+        let centre = match cones.first() {
+            Some(cone) => layout.vertex_position(surface, cone.vertex),
+            None => layout.centre_of_area(),
+        };
+        let upright = layout.upright_turn(surface);
+        let shift = -(upright * Complex::new(centre.x, centre.y));
+        layout.moved(&Transition {
+            turn: upright,
+            shift,
+        });
+        layout.find_seam(surface);
+        layout
+    }
+
+    /// The same layout enlarged by `factor`: flat lengths grow, λ shrinks.
+    pub fn rescaled(&self, factor: f64) -> Self {
+        let mut layout = self.clone();
+        layout
+            .corners
+            .iter_mut()
+            .flatten()
+            .for_each(|p| p.coords *= factor);
+        layout.seam.values_mut().for_each(|t| t.shift *= factor);
+        layout.log_scale.iter_mut().for_each(|x| *x -= factor.ln());
+        layout
+    }
+
+    /// Flat area in mm².
+    pub fn area_mm2(&self) -> f64 {
+        self.corners.iter().map(doubled_area).sum::<f64>() * 0.5
+    }
+
+    /// λ at a point of a face, given by its barycentric coordinates: ln λ is interpolated linearly.
+    #[inline]
+    pub fn scale_at(&self, surface: &Surface, face: FaceId, barycentric: [f64; 3]) -> f64 {
+        let v = surface.faces()[face];
+        (0..3)
+            .map(|k| barycentric[k] * self.log_scale[v[k]])
+            .sum::<f64>()
+            .exp()
+    }
+
+    /// λ's range over the vertices farther than `exclude_mm` (on the flat sheet) from every cone, and the part of the
+    /// surface's area, the cones' neighbourhoods left out, where λ lies in [1, `sigma`].
+    pub fn scale_summary(&self, surface: &Surface, exclude_mm: f64, sigma: f64) -> ScaleSummary {
+        let far = self.far_from_cones(exclude_mm);
+        let mut summary = ScaleSummary {
+            min: f64::INFINITY,
+            max: 0.0,
+            max_vertex: VertexId(0),
+            inside: 0.0,
+        };
+        let mut total = 0.0;
+        for (face, v) in surface.faces().iter_ids() {
+            for k in 0..3 {
+                if !far(self.corners[face][k]) {
+                    continue;
+                }
+                let scale = self.log_scale[v[k]].exp();
+                summary.min = summary.min.min(scale);
+                if scale > summary.max || (scale == summary.max && v[k] < summary.max_vertex) {
+                    (summary.max, summary.max_vertex) = (scale, v[k]);
+                }
+            }
+            let centre = self.corners[face]
+                .iter()
+                .fold(Point2::origin(), |s, p| s + p.coords / 3.0);
+            if far(centre) {
+                let (area, scale) = (
+                    surface.face_area(face),
+                    self.scale_at(surface, face, [1.0 / 3.0; 3]),
+                );
+                total += area;
+                if (1.0 - 1e-9..=sigma + 1e-9).contains(&scale) {
+                    summary.inside += area;
+                }
+            }
+        }
+        summary.inside /= f64::max(total, f64::MIN_POSITIVE);
+        summary
+    }
+
+    /// Whether a chart point is farther than `radius_mm` from every cone. (One cone: it is the chart's origin.)
+    fn far_from_cones(&self, radius_mm: f64) -> impl Fn(Point2<f64>) -> bool + use<> {
+        let cone = !self.cones.is_empty();
+        move |p| !cone || p.coords.norm() > radius_mm
+    }
+
+    /// Angle distortion per face: the ratio of the singular values of the flat → surface map, 1 if conformal.
+    pub fn quasi_conformal_error(&self, surface: &Surface) -> Per<FaceId, f64> {
+        self.corners
+            .iter_ids()
+            .map(|(face, flat)| {
+                let p = surface.corners(face);
+                let (e1, e2) = (flat[1] - flat[0], flat[2] - flat[0]);
+                let det = e1.perp(&e2);
+                if det.abs() < f64::MIN_POSITIVE {
+                    return f64::INFINITY;
+                }
+                let (f1, f2) = (p[1] - p[0], p[2] - p[0]);
+                let (dx, dy) = ((f1 * e2.y - f2 * e1.y) / det, (f2 * e1.x - f1 * e2.x) / det);
+                let (a, b, c) = (dx.norm_squared(), dx.dot(&dy), dy.norm_squared());
+                let half_gap = (0.25 * (a - c) * (a - c) + b * b).sqrt();
+                let mean = 0.5 * (a + c);
+                ((mean + half_gap) / (mean - half_gap).max(f64::MIN_POSITIVE)).sqrt()
+            })
+            .collect()
+    }
+
+    /// Applies a rigid motion of the sheet.
+    pub fn moved(&mut self, motion: &Transition) {
+        self.corners
+            .iter_mut()
+            .flatten()
+            .for_each(|p| *p = motion.apply(*p));
+        let back = motion.inverse();
+        self.seam
+            .values_mut()
+            .for_each(|t| *t = back.then(t).then(motion));
+    }
+
+    fn vertex_position(&self, surface: &Surface, vertex: VertexId) -> Point2<f64> {
+        surface
+            .around(vertex)
+            .next()
+            .map_or_else(Point2::origin, |h| self.corners[h.face()][h.corner()])
+    }
+
+    fn centre_of_area(&self) -> Point2<f64> {
+        let (mut sum, mut total) = (Point2::origin(), 0.0);
+        for flat in self.corners.iter() {
+            let area = doubled_area(flat);
+            let centre = (flat[0].coords + flat[1].coords + flat[2].coords) / 3.0;
+            sum += centre * area;
+            total += area;
+        }
+        Point2::from(sum.coords / total)
+    }
+
+    /// The rotation that makes the sheet look like the surface seen along its mean normal, +Y up (+Z where the surface
+    /// faces up or down): a mask lies upright on the sheet.
+    fn upright_turn(&self, surface: &Surface) -> Complex<f64> {
+        let normal: Vector3<f64> = surface
+            .faces()
+            .ids()
+            .map(|f| surface.face_normal_doubled(f))
+            .sum();
+        let normal = normal
+            .try_normalize(1e-12 * surface.area())
+            .unwrap_or_else(Vector3::z);
+        let up = if normal.y.abs() > 0.9 {
+            -Vector3::z() * normal.y.signum()
+        } else {
+            Vector3::y()
+        };
+        let right = up.cross(&normal).normalize();
+        let up = normal.cross(&right);
+        let mut fit = Complex::new(0.0, 0.0);
+        for (face, flat) in self.corners.iter_ids() {
+            let p = surface.corners(face);
+            for k in 0..3 {
+                let (edge, target) = (flat[(k + 1) % 3] - flat[k], p[(k + 1) % 3] - p[k]);
+                fit += Complex::new(edge.x, edge.y).conj()
+                    * Complex::new(target.dot(&right), target.dot(&up));
+            }
+        }
+        if fit.modulus() > 0.0 {
+            fit / fit.modulus()
+        } else {
+            Complex::new(1.0, 0.0)
+        }
+    }
+
+    fn closure_error(&self, surface: &Surface, metric: &Metric) -> f64 {
+        let mut worst = 0.0f64;
+        for (face, flat) in self.corners.iter_ids() {
+            let lengths = metric.lengths(surface, face);
+            for k in 0..3 {
+                worst = worst.max(((flat[(k + 1) % 3] - flat[k]).norm() / lengths[k] - 1.0).abs());
+            }
+        }
+        worst
+    }
+
+    /// Transitions across the cut. The rotation is snapped to the multiple of 120° that the cones allow, and with one
+    /// cone, which is the origin, there is nothing left to translate.
+    fn find_seam(&mut self, surface: &Surface) {
+        for &h in &self.cut {
+            let Some(twin) = surface.twin(h) else {
+                continue;
+            };
+            let ends = |h: HalfedgeId| {
+                let c = &self.corners[h.face()];
+                (c[h.corner()], c[(h.corner() + 1) % 3])
+            };
+            let ((a, b), (tb, ta)) = (ends(h), ends(twin));
+            let complex = |v: nalgebra::Vector2<f64>| Complex::new(v.x, v.y);
+            let measured = complex(tb - ta) / complex(b - a);
+            let thirds = (measured.argument() / (2.0 * PI / 3.0)).round();
+            let turn = Complex::from_polar(1.0, thirds * 2.0 * PI / 3.0);
+            let there = Transition {
+                turn,
+                shift: Complex::new(0.0, 0.0),
+            };
+            self.seam.insert(h, there);
+            self.seam.insert(twin, there.inverse());
+        }
+    }
+}
+
+#[inline]
+fn doubled_area(flat: &[Point2<f64>; 3]) -> f64 {
+    (flat[1] - flat[0]).perp(&(flat[2] - flat[0]))
+}
+
+/// The third corner, left of a → b, at distances `bc` from b and `ca` from a.
+fn apex(a: Point2<f64>, b: Point2<f64>, ab: f64, bc: f64, ca: f64) -> Point2<f64> {
+    let along = (ab * ab + ca * ca - bc * bc) / (2.0 * ab);
+    let perimeter = ab + bc + ca;
+    let area4 =
+        (perimeter * (bc + ca - ab).max(0.0) * (ca + ab - bc).max(0.0) * (ab + bc - ca).max(0.0))
+            .sqrt();
+    let height = area4 / (2.0 * ab);
+    let direction = (b - a) / (b - a).norm();
+    a + direction * along + nalgebra::Vector2::new(-direction.y, direction.x) * height
+}
+
+/// For every corner of every face the number of its copy in the cut-open surface, and how many there are.
+fn wedges(surface: &Surface, is_cut: &Per<HalfedgeId, bool>) -> (Per<FaceId, [usize; 3]>, usize) {
+    let mut wedge_of = Per::filled(surface.faces().len(), [usize::MAX; 3]);
+    let mut count = 0;
+    for vertex in surface.positions().ids() {
+        let fan: Vec<HalfedgeId> = surface.around(vertex).collect();
+        // Begin behind a cut edge if there is one, so that no wedge is split by the start of the turn.
+        let start = fan
+            .iter()
+            .position(|h| is_cut[*h])
+            .filter(|_| !surface.on_rim(vertex))
+            .unwrap_or(0);
+        for i in 0..fan.len() {
+            let h = fan[(start + i) % fan.len()];
+            if i == 0 || is_cut[h] {
+                count += 1;
+            }
+            wedge_of[h.face()][h.corner()] = count - 1;
+        }
+    }
+    (wedge_of, count)
+}
+
+/// A face as far from the rim as faces go (in steps across edges).
+fn central_face(surface: &Surface) -> FaceId {
+    let mut seen = Per::<FaceId, bool>::filled(surface.faces().len(), false);
+    let mut queue = VecDeque::new();
+    for h in surface.halfedges() {
+        if surface.twin(h).is_none() && !seen[h.face()] {
+            seen[h.face()] = true;
+            queue.push_back(h.face());
+        }
+    }
+    let mut last = FaceId::from_index(0);
+    while let Some(face) = queue.pop_front() {
+        last = face;
+        for k in 0..3 {
+            if let Some(twin) = surface.twin(HalfedgeId::side(face, k))
+                && !seen[twin.face()]
+            {
+                seen[twin.face()] = true;
+                queue.push_back(twin.face());
+            }
+        }
+    }
+    last
+}

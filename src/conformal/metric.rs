@@ -1,0 +1,352 @@
+//! The discretely conformal metric of a disk with given cone angles (CETM).
+//!
+//! Two metrics on one mesh are discretely conformally equivalent if l̃ᵢⱼ = e^{(uᵢ+uⱼ)/2} lᵢⱼ. The u whose angle sums are
+//! Θᵢ inside and that vanishes on the rim is the minimum of a convex function with gradient Θᵢ − Σα and the cotangent
+//! Laplacian of the scaled metric as Hessian (Springborn, Schröder, Pinkall: Conformal equivalence of triangle meshes,
+//! 2008, §§3–4); u = 0 on the rim gives the least area distortion (same paper, appendix E). Where a triangle inequality
+//! fails the angles are extended by 0 and π, which keeps the function convex and once differentiable.
+
+use std::f64::consts::PI;
+
+use super::{Cone, ConformalError};
+use crate::base::ids::Per;
+use crate::base::progress::Progress;
+use crate::base::sparse::{Cholesky, FactorError, Pattern};
+use crate::mesh::{FaceId, Surface, VertexId};
+
+/// Largest angle-sum error accepted, radians. Angle sums of a fan of six carry a rounding error of about 10⁻¹⁵ each;
+/// this leaves room for vertices of high degree and for lengths that span orders of magnitude. The error in u is about
+/// the same, times the mesh's diameter in edges at the worst. Costs at most one Newton step over 10⁻⁶.
+const ANGLE_TOLERANCE: f64 = 1e-12;
+
+/// Above this residual a solve that has stopped improving is a failure, radians. Far below anything that shows: the
+/// layout's seams close to this accuracy.
+const ANGLE_ACCEPTED: f64 = 1e-8;
+
+/// Newton steps before giving up. Good meshes take 2–7, meshes with broken triangles up to about 30.
+const MAX_STEPS: usize = 60;
+
+/// The result of a solve.
+#[derive(Clone, Debug)]
+pub struct Metric {
+    /// Logarithmic factor u per vertex: l̃ᵢⱼ = e^{(uᵢ+uⱼ)/2} lᵢⱼ; 0 on the rim.
+    pub u: Per<VertexId, f64>,
+    /// Newton steps taken.
+    pub steps: usize,
+    /// Largest remaining error of an angle sum, radians.
+    pub residual: f64,
+    /// Faces whose scaled lengths break the triangle inequality: drawn with angles 0 and π.
+    pub broken: Vec<FaceId>,
+}
+
+impl Metric {
+    /// Scaled lengths of a face's sides (side k from corner k to k + 1).
+    pub fn lengths(&self, surface: &Surface, face: FaceId) -> [f64; 3] {
+        let v = surface.faces()[face];
+        let p = surface.corners(face);
+        std::array::from_fn(|k| {
+            let next = (k + 1) % 3;
+            (p[next] - p[k]).norm() * (0.5 * (self.u[v[k]] + self.u[v[next]])).exp()
+        })
+    }
+}
+
+/// Angles of the triangle with these side lengths and their cotangents, at the corner opposite each side. A broken
+/// triangle has angle π opposite the side that is too long, 0 elsewhere, and no cotangents.
+fn angles(lengths: [f64; 3]) -> ([f64; 3], [f64; 3], bool) {
+    let [a, b, c] = lengths;
+    let (sa, sb, sc) = (b + c - a, c + a - b, a + b - c);
+    for (k, slack) in [sa, sb, sc].into_iter().enumerate() {
+        if slack <= 0.0 {
+            let mut broken = [0.0; 3];
+            broken[k] = PI;
+            return (broken, [0.0; 3], true);
+        }
+    }
+    // 4·area by Heron; cot α = (b² + c² − a²) / (4·area); tan α/2 = 4·area / ((b + c)² − a²).
+    let perimeter = a + b + c;
+    let area4 = (perimeter * sa * sb * sc).sqrt();
+    let angle = |slack: f64| 2.0 * area4.atan2(perimeter * slack);
+    let cot = |x: f64, y: f64, z: f64| (y * y + z * z - x * x) / area4;
+    (
+        [angle(sa), angle(sb), angle(sc)],
+        [cot(a, b, c), cot(b, c, a), cot(c, a, b)],
+        false,
+    )
+}
+
+/// Solves for the metric of one surface with different cones; the symbolic factor is computed once.
+pub struct MetricSolver<'a> {
+    surface: &'a Surface,
+    /// Row of each interior vertex, `u32::MAX` on the rim.
+    row: Per<VertexId, u32>,
+    rows: usize,
+    /// Logarithms of the side lengths.
+    log_length: Per<FaceId, [f64; 3]>,
+    /// Value slots: per face three diagonal entries (corner k) and three for side k (or `u32::MAX` at the rim).
+    slots: Per<FaceId, [u32; 6]>,
+    cholesky: Cholesky,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl<'a> MetricSolver<'a> {
+    /// Prepares the solver of a surface with at least one rim.
+    ///
+    /// # Errors
+    /// [`ConformalError::ZeroLength`] for an edge without length, or out of memory.
+    pub fn new(surface: &'a Surface) -> Result<Self, ConformalError> {
+        let mut row = Per::filled(surface.positions().len(), NONE);
+        let mut rows = 0;
+        for vertex in surface.positions().ids() {
+            if !surface.on_rim(vertex) {
+                row[vertex] = rows as u32;
+                rows += 1;
+            }
+        }
+        let mut log_length = Vec::with_capacity(surface.faces().len());
+        for (face, v) in surface.faces().iter_ids() {
+            let p = surface.corners(face);
+            let mut logs = [0.0; 3];
+            for k in 0..3 {
+                let length = (p[(k + 1) % 3] - p[k]).norm();
+                if length <= 0.0 {
+                    return Err(ConformalError::ZeroLength {
+                        tail: v[k],
+                        head: v[(k + 1) % 3],
+                    });
+                }
+                logs[k] = length.ln();
+            }
+            log_length.push(logs);
+        }
+        let inner_edges = surface.edges().filter_map(|h| {
+            let (i, j) = (row[surface.tail(h)], row[surface.head(h)]);
+            (i != NONE && j != NONE).then_some((i, j))
+        });
+        let cholesky = Cholesky::new(Pattern::new(rows, inner_edges))?;
+        let slot = |i: u32, j: u32| -> u32 {
+            if i == NONE || j == NONE {
+                return NONE;
+            }
+            cholesky
+                .pattern()
+                .slot(i as usize, j as usize)
+                .map_or(NONE, |s| s as u32)
+        };
+        let slots = surface
+            .faces()
+            .iter()
+            .map(|v| {
+                let r = v.map(|v| row[v]);
+                std::array::from_fn(|k| {
+                    if k < 3 {
+                        slot(r[k], r[k])
+                    } else {
+                        slot(r[k - 3], r[(k - 2) % 3])
+                    }
+                })
+            })
+            .collect();
+        Ok(Self {
+            surface,
+            row,
+            rows,
+            log_length: Per::new(log_length),
+            slots,
+            cholesky,
+        })
+    }
+
+    /// Gradient Θ − Σα at `u` into `gradient`, Hessian values into `hessian` if asked; returns the broken faces' number.
+    fn evaluate(
+        &self,
+        u: &[f64],
+        target: &[f64],
+        gradient: &mut [f64],
+        hessian: Option<&mut [f64]>,
+    ) -> usize {
+        gradient.copy_from_slice(target);
+        let mut hessian = hessian;
+        if let Some(values) = hessian.as_deref_mut() {
+            values.fill(0.0);
+        }
+        let mut broken = 0;
+        for (face, v) in self.surface.faces().iter_ids() {
+            let row = v.map(|v| self.row[v]);
+            if row == [NONE; 3] {
+                continue;
+            }
+            let at = row.map(|r| if r == NONE { 0.0 } else { u[r as usize] });
+            let logs = &self.log_length[face];
+            let lengths =
+                std::array::from_fn(|k| (logs[k] + 0.5 * (at[k] + at[(k + 1) % 3])).exp());
+            let (angle, cot, bad) = angles(lengths);
+            broken += usize::from(bad);
+            // `angle[k]` lies opposite side k, that is at corner k + 2.
+            for k in 0..3 {
+                if row[(k + 2) % 3] != NONE {
+                    gradient[row[(k + 2) % 3] as usize] -= angle[k];
+                }
+            }
+            if let Some(values) = hessian.as_deref_mut() {
+                let slots = &self.slots[face];
+                for k in 0..3 {
+                    let half = 0.5 * cot[k];
+                    for corner in [k, (k + 1) % 3] {
+                        if slots[corner] != NONE {
+                            values[slots[corner] as usize] += half;
+                        }
+                    }
+                    if slots[3 + k] != NONE {
+                        values[slots[3 + k] as usize] -= half;
+                    }
+                }
+            }
+        }
+        broken
+    }
+
+    /// The metric with the given cones and a flat rest. Every cone must be an interior vertex.
+    ///
+    /// # Errors
+    /// [`ConformalError::NotConverged`] with the worst vertex; interruption.
+    pub fn solve(
+        &mut self,
+        cones: &[Cone],
+        progress: &dyn Progress,
+    ) -> Result<Metric, ConformalError> {
+        let mut target = vec![2.0 * PI; self.rows];
+        for cone in cones {
+            match self.row[cone.vertex] {
+                NONE => {
+                    return Err(ConformalError::ConeOnRim {
+                        vertex: cone.vertex,
+                    });
+                }
+                row => target[row as usize] = cone.angle(),
+            }
+        }
+        let norm = |g: &[f64]| g.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        let mut u = vec![0.0; self.rows];
+        let (mut gradient, mut trial_gradient) = (vec![0.0; self.rows], vec![0.0; self.rows]);
+        let (mut step, mut trial) = (vec![0.0; self.rows], vec![0.0; self.rows]);
+        let mut hessian = vec![0.0; self.cholesky.pattern().entries()];
+        let mut broken = self.evaluate(&u, &target, &mut gradient, Some(&mut hessian));
+        let mut residual = norm(&gradient);
+        let mut steps = 0;
+        while residual > ANGLE_TOLERANCE && steps < MAX_STEPS {
+            progress.check()?;
+            self.factor(&mut hessian)?;
+            for (s, g) in step.iter_mut().zip(&gradient) {
+                *s = -g;
+            }
+            self.cholesky.solve(&mut step);
+            let slope: f64 = gradient.iter().zip(&step).map(|(g, s)| g * s).sum();
+            // The function is convex along the line, so its slope tells everything: a step is good while the slope has
+            // not turned clearly positive, and no function value, with its cancellation, is ever needed.
+            let mut length = 1.0;
+            let improved = loop {
+                for ((t, u), s) in trial.iter_mut().zip(&u).zip(&step) {
+                    *t = u + length * s;
+                }
+                broken = self.evaluate(&trial, &target, &mut trial_gradient, Some(&mut hessian));
+                let trial_slope: f64 = trial_gradient.iter().zip(&step).map(|(g, s)| g * s).sum();
+                let rest = norm(&trial_gradient);
+                if rest.is_finite() && (trial_slope <= -0.1 * slope || rest < 0.5 * residual) {
+                    break rest < residual || trial_slope <= 0.1 * slope;
+                }
+                length *= 0.5;
+                if length < 1e-10 {
+                    break false;
+                }
+            };
+            steps += 1;
+            let rest = norm(&trial_gradient);
+            // At the accuracy of rounding a step no longer improves anything: keep the better point and stop.
+            if !improved || (residual < 1e-9 && rest >= residual) {
+                break;
+            }
+            std::mem::swap(&mut u, &mut trial);
+            std::mem::swap(&mut gradient, &mut trial_gradient);
+            residual = rest;
+        }
+        if residual > ANGLE_ACCEPTED {
+            let worst = (0..self.rows)
+                .max_by(|&a, &b| gradient[a].abs().total_cmp(&gradient[b].abs()))
+                .unwrap_or(0);
+            let vertex = self
+                .row
+                .iter_ids()
+                .find(|(_, r)| **r == worst as u32)
+                .map_or(VertexId(0), |(v, _)| v);
+            return Err(ConformalError::NotConverged {
+                steps,
+                residual_deg: residual.to_degrees(),
+                vertex,
+                position: self.surface.position(vertex).into(),
+            });
+        }
+        let u: Per<VertexId, f64> = self
+            .row
+            .iter()
+            .map(|&r| if r == NONE { 0.0 } else { u[r as usize] })
+            .collect();
+        let mut metric = Metric {
+            u,
+            steps,
+            residual,
+            broken: Vec::new(),
+        };
+        if broken > 0 {
+            metric.broken = self
+                .surface
+                .faces()
+                .ids()
+                .filter(|f| angles(metric.lengths(self.surface, *f)).2)
+                .collect();
+        }
+        Ok(metric)
+    }
+
+    /// Factors the Hessian; where broken triangles leave it singular, a growing multiple of its diagonal is added,
+    /// which shortens the step but keeps it downhill.
+    fn factor(&mut self, hessian: &mut [f64]) -> Result<(), ConformalError> {
+        let mut shift = 0.0;
+        let diagonal: Vec<usize> = (0..self.rows)
+            .filter_map(|i| self.cholesky.pattern().slot(i, i))
+            .collect();
+        let mean =
+            diagonal.iter().map(|&s| hessian[s].abs()).sum::<f64>() / self.rows.max(1) as f64;
+        loop {
+            match self.cholesky.factor(hessian) {
+                Err(FactorError::NotPositiveDefinite) if shift < 1e6 => {
+                    let next = if shift == 0.0 { 1e-10 } else { shift * 100.0 };
+                    for &slot in &diagonal {
+                        hessian[slot] += (next - shift) * mean.max(1e-30);
+                    }
+                    shift = next;
+                }
+                other => return Ok(other?),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_of_known_triangles_and_of_broken_ones() {
+        let (angle, cot, bad) = angles([1.0, 1.0, 2f64.sqrt()]);
+        assert!(!bad);
+        assert!((angle[0] - PI / 4.0).abs() < 1e-15 && (angle[2] - PI / 2.0).abs() < 1e-15);
+        assert!((cot[0] - 1.0).abs() < 1e-15 && cot[2].abs() < 1e-15);
+        assert_eq!(angles([1.0, 5.0, 1.0]), ([0.0, PI, 0.0], [0.0; 3], true));
+        // A needle keeps an exact angle sum.
+        let (angle, ..) = angles([1.0, 1.0, 1e-9]);
+        assert!((angle.iter().sum::<f64>() - PI).abs() < 1e-14);
+        assert!((angle[2] - 1e-9).abs() < 1e-20);
+    }
+}
