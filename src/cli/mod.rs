@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 1 the answer is no, 2 bad usage or bad input. Results go to standard output (`--json` for
 //! machines), everything else to standard error.
 
+pub mod samples;
 mod terminal;
 
 use std::ffi::OsString;
@@ -39,7 +40,10 @@ pub struct Global {
 }
 
 #[derive(Subcommand)]
-enum Verb {}
+enum Verb {
+    /// List the sample surfaces, or write one as a file
+    Samples(samples::SamplesArgs),
+}
 
 /// Why a verb did not end with "done".
 #[derive(Debug)]
@@ -68,9 +72,10 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let terminal = Terminal::new(cli.global.quiet);
-    let _ = &terminal;
-    let result: Result<(), Failure> = match cli.verb {};
-    #[allow(unreachable_code)]
+    let result = match &cli.verb {
+        Verb::Samples(args) => samples::run(args, &cli.global, &terminal),
+    };
+    terminal.clear();
     report(result)
 }
 

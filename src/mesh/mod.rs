@@ -2,6 +2,7 @@
 
 pub mod samples;
 mod surface;
+pub mod write;
 
 pub use samples::{Sample, SampleError};
 pub use surface::{FaceId, HalfedgeId, Surface, TopologyError, VertexId};
