@@ -8,7 +8,8 @@ use super::parameter::{Parameter, parameters};
 use super::revolve::{Arrays, Ends, revolve};
 
 parameters! {
-    /// A face: forehead, brows, eyes, nose, cheeks, lips and chin on an oval dome.
+    /// A face: forehead, brows, closed eyes, nose, cheeks, lips and chin on an oval dome. With the defaults
+    /// max λ / min λ is 2.3 without a cone, and 1.8 with one at the tip of the nose, outside the nearest 7 mm.
     Mask {
         /// height from chin to crown
         height_mm = 200.0 in 1.0..=10000.0,
@@ -34,7 +35,7 @@ impl Mask {
 
 /// From the unit disk to the outline of a face: an oval that narrows towards the chin.
 fn oval(u: f64, v: f64) -> (f64, f64) {
-    let width = 0.74 * (1.0 + 0.10 * v - 0.05 * v * v);
+    let width = 0.76 * (1.0 + 0.08 * v - 0.07 * v * v);
     (u * width, v)
 }
 
@@ -42,7 +43,7 @@ fn oval(u: f64, v: f64) -> (f64, f64) {
 fn height(u: f64, v: f64, x: f64, y: f64, relief: f64) -> f64 {
     let inside = 1.0 - u * u - v * v;
     // Not quite a paraboloid: flatter in front, rounder at the temples.
-    let dome = 0.62 * inside - 0.10 * inside * inside;
+    let dome = 0.56 * inside - 0.13 * inside * inside;
     // Features fade out before the rim, which stays a smooth curve.
     let fade = (3.0 * inside).clamp(0.0, 1.0);
     let fade = fade * fade * (3.0 - 2.0 * fade);
@@ -57,19 +58,27 @@ fn bump(x: f64, y: f64, (cx, cy): (f64, f64), (sx, sy): (f64, f64)) -> f64 {
 
 /// The relief on top of the dome; symmetric in x.
 fn features(x: f64, y: f64) -> f64 {
-    let mut z = 0.0;
-    // Both sides of a feature that lies off the middle: the sum is smooth across x = 0.
-    let pair = |centre: (f64, f64), size: (f64, f64)| {
+    // A feature off the middle comes in two, and their sum is smooth across x = 0.
+    let both = |centre: (f64, f64), size: (f64, f64)| {
         bump(x, y, centre, size) + bump(x, y, (-centre.0, centre.1), size)
     };
-    z += 0.020 * bump(x, y, (0.0, 0.55), (0.30, 0.22));
-    z += 0.035 * pair((0.24, 0.20), (0.15, 0.06));
-    z -= 0.060 * pair((0.25, 0.05), (0.13, 0.08));
-    z += 0.035 * pair((0.25, 0.03), (0.09, 0.045));
-    z += 0.17 * bump(x, y, (0.0, -0.13), (0.085, 0.16));
-    z += 0.030 * pair((0.34, -0.20), (0.14, 0.15));
-    z += 0.045 * bump(x, y, (0.0, -0.43), (0.13, 0.05));
-    z += 0.050 * bump(x, y, (0.0, -0.56), (0.10, 0.05));
-    z += 0.060 * bump(x, y, (0.0, -0.78), (0.15, 0.11));
-    z
+    let middle = |cy: f64, size: (f64, f64)| bump(x, y, (0.0, cy), size);
+
+    let forehead = 0.022 * middle(0.58, (0.32, 0.20));
+    let brows =
+        0.030 * both((0.23, 0.265), (0.14, 0.055)) + 0.014 * both((0.36, 0.235), (0.09, 0.05));
+    let sockets = -0.078 * both((0.24, 0.115), (0.13, 0.085));
+    let lids =
+        0.062 * both((0.245, 0.095), (0.095, 0.055)) - 0.022 * both((0.245, 0.045), (0.085, 0.019));
+    let nose = 0.052 * middle(0.06, (0.062, 0.15))
+        + 0.135 * middle(-0.16, (0.090, 0.095))
+        + 0.045 * both((0.095, -0.19), (0.05, 0.05));
+    let cheeks =
+        0.032 * both((0.33, -0.13), (0.13, 0.14)) - 0.014 * both((0.24, -0.40), (0.07, 0.09));
+    let mouth = 0.040 * middle(-0.44, (0.16, 0.10)) + 0.025 * both((0.05, -0.435), (0.075, 0.031))
+        - 0.026 * middle(-0.487, (0.14, 0.020))
+        + 0.042 * middle(-0.545, (0.085, 0.036))
+        - 0.018 * middle(-0.635, (0.12, 0.035));
+    let chin = 0.060 * middle(-0.76, (0.14, 0.10));
+    forehead + brows + sockets + lids + nose + cheeks + mouth + chin
 }
