@@ -4,4 +4,6 @@ pub mod base;
 pub mod cli;
 pub mod conformal;
 pub mod linkage;
+pub mod machine;
+pub mod material;
 pub mod mesh;

@@ -3,10 +3,12 @@
 //! - [`ids`]: typed indices and the per-element containers that only they open;
 //! - [`progress`]: how long work reports and how it is interrupted, without knowing a terminal;
 //! - [`atomic`]: outputs that appear complete or not at all;
+//! - [`document`]: TOML that a person wrote, read strictly and blamed exactly;
 //! - [`sparse`]: symmetric positive definite systems, with the symbolic factor kept between solves;
 //! - [`units`]: the few conversions and number formats that several rooms share.
 
 pub mod atomic;
+pub mod document;
 pub mod ids;
 pub mod progress;
 pub mod sparse;

@@ -1,0 +1,191 @@
+//! The machines in the binary, and machines from files.
+
+use std::path::{Path, PathBuf};
+
+use super::profile::Machine;
+use crate::base::document::{Document, DocumentError};
+
+/// The machine that is meant when none is named.
+pub const DEFAULT: &str = "co2-600x400";
+
+/// Every file of `machines/`, in the order of their names.
+const SHIPPED: &[(&str, &str)] = &[
+    (
+        "co2-600x400",
+        include_str!("../../machines/co2-600x400.toml"),
+    ),
+    ("diode-400", include_str!("../../machines/diode-400.toml")),
+    ("fibre-300", include_str!("../../machines/fibre-300.toml")),
+];
+
+/// Why there is no machine.
+#[derive(Debug, thiserror::Error)]
+pub enum MachineError {
+    /// Neither a shipped name nor a file.
+    #[error("there is no machine `{name}`. Shipped: {known}; or give the path of a TOML file")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The names of the shipped ones.
+        known: String,
+    },
+    /// The file cannot be read.
+    #[error("machine file {path} cannot be read: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The profile is wrong.
+    #[error(transparent)]
+    Profile(#[from] DocumentError),
+}
+
+/// The names of the shipped machines with their texts.
+pub fn shipped() -> impl ExactSizeIterator<Item = (&'static str, &'static str)> {
+    SHIPPED.iter().copied()
+}
+
+/// A shipped machine by its name, or one from a file by its path. A shipped name wins; `./NAME` means the file.
+///
+/// # Errors
+/// [`MachineError`]: unknown name (with the known ones), unreadable file, or a wrong profile with file, line and key.
+pub fn load(name_or_path: &str) -> Result<Machine, MachineError> {
+    if let Some((name, text)) = shipped().find(|(name, _)| *name == name_or_path) {
+        return Ok(parse(&format!("{name} (shipped)"), text)?);
+    }
+    let path = Path::new(name_or_path);
+    let looks_like_a_file =
+        path.extension().is_some_and(|e| e == "toml") || path.components().count() > 1;
+    if !looks_like_a_file && !path.is_file() {
+        return Err(MachineError::Unknown {
+            name: name_or_path.into(),
+            known: shipped().map(|(n, _)| n).collect::<Vec<_>>().join(", "),
+        });
+    }
+    let text = std::fs::read_to_string(path).map_err(|source| MachineError::Read {
+        path: path.into(),
+        source,
+    })?;
+    Ok(parse(name_or_path, &text)?)
+}
+
+/// A machine from the text of a profile; `file` is what messages call it.
+///
+/// # Errors
+/// [`DocumentError`] with file, line and key.
+pub fn parse(file: &str, text: &str) -> Result<Machine, DocumentError> {
+    Document::new(file, text).read(Machine::validate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_file_is_embedded_and_bears_its_own_name() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("machines");
+        let mut files: Vec<String> = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|e| {
+                e.unwrap()
+                    .path()
+                    .file_stem()
+                    .unwrap()
+                    .to_string_lossy()
+                    .into_owned()
+            })
+            .collect();
+        files.sort();
+        let embedded: Vec<&str> = shipped().map(|(n, _)| n).collect();
+        assert_eq!(files, embedded);
+        for (name, _) in shipped() {
+            assert_eq!(load(name).unwrap().name, name);
+        }
+        assert!(load(DEFAULT).is_ok());
+    }
+
+    #[test]
+    fn every_machine_cuts_some_shipped_material_and_every_material_finds_a_machine() {
+        let machines: Vec<Machine> = shipped().map(|(n, _)| load(n).unwrap()).collect();
+        let materials: Vec<_> = crate::material::shipped()
+            .map(|(n, _)| crate::material::load(n).unwrap())
+            .collect();
+        let pairs = |f: &dyn Fn(&Machine, &crate::material::Material) -> bool| {
+            machines
+                .iter()
+                .flat_map(|a| materials.iter().map(move |b| (a, b)))
+                .filter(|(a, b)| f(a, b))
+                .count()
+        };
+        for machine in &machines {
+            assert!(pairs(&|a, b| a.name == machine.name && b.cut_for(a).is_ok()) > 0);
+        }
+        for material in &materials {
+            assert!(
+                pairs(&|a, b| b.name == material.name && b.cut_for(a).is_ok()) > 0,
+                "no machine cuts {}",
+                material.name
+            );
+        }
+        // Copper under a CO₂ beam is the refusal that matters: it reflects.
+        assert_eq!(
+            pairs(&|a, b| b.name == "copper-0.2" && b.cut_for(a).is_ok()),
+            1
+        );
+    }
+
+    #[test]
+    fn each_check_has_a_text_that_fails_it() {
+        let (_, good) = shipped().find(|(n, _)| *n == DEFAULT).unwrap();
+        for (from, to, key) in [
+            ("format = 1", "format = 7", "format"),
+            ("name = \"co2-600x400\"", "name = \"\"", "name"),
+            ("watts = 60", "watts = nan", "laser.watts"),
+            ("s_max = 1000", "s_max = 0", "laser.s_max"),
+            ("\"dynamic\"", "\"constant\"", "laser.power_mode"),
+            ("width_mm = 600", "width_mm = 1", "bed.width_mm"),
+            ("margin_mm = 5", "margin_mm = 300", "bed.margin_mm"),
+            ("x = 30000", "x = -1", "motion.rate_mm_per_min.x"),
+            ("y = 1000", "y = 0", "motion.acceleration_mm_per_s2.y"),
+            (
+                "junction_deviation_mm = 0.01",
+                "junction_deviation_mm = 2",
+                "motion.junction_deviation_mm",
+            ),
+            ("baud = 115200", "baud = 9", "connection.baud"),
+            (
+                "receive_buffer_bytes = 128",
+                "receive_buffer_bytes = 64",
+                "connection.receive_buffer_bytes",
+            ),
+            (
+                "planner_blocks = 15",
+                "planner_blocks = 0",
+                "connection.planner_blocks",
+            ),
+            ("x_mm = 0", "x_mm = -3", "job.park.x_mm"),
+            ("\"G54\"", "\"G54 ; ready?\"", "job.preamble[0]"),
+            ("\"G54\"", "\"\"", "job.preamble[0]"),
+            (
+                "\"M8\"",
+                "\"M8 (0123456789012345678901234567890123456789012345678901234567890123456789012345)\"",
+                "laser.air_on",
+            ),
+            ("controller = \"grbl\"", "controller = \"marlin\"", ""),
+            ("homing", "hooming", ""),
+        ] {
+            assert!(good.contains(from), "the fixture changed: {from}");
+            let error = parse("x.toml", &good.replacen(from, to, 1)).unwrap_err();
+            assert!(error.line.is_some(), "{from}: {error}");
+            assert_eq!(error.key.as_deref().unwrap_or(""), key, "{error}");
+        }
+        let accepted = good.replacen(
+            "\"dynamic\"",
+            "\"constant\"\naccept_beam_on_after_lost_link = true",
+            1,
+        );
+        assert!(parse("x.toml", &accepted).is_ok());
+    }
+}
