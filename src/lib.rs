@@ -7,3 +7,4 @@ pub mod linkage;
 pub mod machine;
 pub mod material;
 pub mod mesh;
+pub mod rationalize;

@@ -112,6 +112,15 @@ impl ClosestPoint {
         self.search(p, if known { hint } else { FaceId(0) })
     }
 
+    /// Outward unit normal of a face; zero if the face has no area.
+    pub fn normal(&self, face: FaceId) -> Vector3<f64> {
+        let [a, b, c] = self.triangles[self.slots[face] as usize].corners;
+        (b - a)
+            .cross(&(c - a))
+            .try_normalize(0.0)
+            .unwrap_or_else(Vector3::zeros)
+    }
+
     fn search(&self, p: Point3<f64>, first: FaceId) -> Closest {
         let start = self.slots[first] as usize;
         let mut best = (
@@ -215,6 +224,11 @@ struct Hit {
 fn combine(corners: &[Point3<f64>; 3], weights: [f64; 3]) -> Point3<f64> {
     let [a, b, c] = corners;
     a + (b - a) * weights[1] + (c - a) * weights[2]
+}
+
+/// Distance of a point from one triangle, in the units of its corners.
+pub fn distance_to_triangle(corners: &[Point3<f64>; 3], p: &Point3<f64>) -> f64 {
+    on_triangle(corners, p).squared.sqrt()
 }
 
 /// Ericson's regions: first the corners, then the sides, then the inside.

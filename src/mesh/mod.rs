@@ -6,7 +6,7 @@ pub mod samples;
 mod surface;
 pub mod write;
 
-pub use closest::{Closest, ClosestPoint, Feature};
+pub use closest::{Closest, ClosestPoint, Feature, distance_to_triangle};
 pub use edit::insert_point;
 pub use samples::{Sample, SampleError};
 pub use surface::{FaceId, HalfedgeId, Surface, TopologyError, VertexId};

@@ -1,0 +1,66 @@
+//! Stage 4: the lifted linkage becomes exact: rigid triangles, no overlap, hinges within σ, on the surface.
+//!
+//! [`rationalize`] runs one of two solvers from the opened lift: [`Solver::Exact`] (all conditions to rounding) or
+//! [`Solver::Projection`] (the paper's, for preview and comparison). [`Quality`] measures the result independently of
+//! either.
+
+mod exact;
+mod grid;
+mod problem;
+mod projection;
+mod quality;
+
+use nalgebra::Point3;
+
+pub use exact::Effort;
+pub use problem::Problem;
+pub use quality::{OVERLAP_TOLERANCE, Quality, SIGMA_TOLERANCE, Worst};
+
+use crate::base::progress::{Interrupted, Progress};
+use crate::base::sparse::FactorError;
+use crate::linkage::Linkage;
+use crate::mesh::ClosestPoint;
+
+/// Which solver.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Solver {
+    /// Levenberg–Marquardt on all conditions.
+    #[default]
+    Exact,
+    /// The paper's alternating projection.
+    Projection,
+}
+
+/// Why there is no result. (A result that is not good enough is a result: see [`Quality`].)
+#[derive(Debug, thiserror::Error)]
+pub enum RationalizeError {
+    /// The linear system failed.
+    #[error(transparent)]
+    Factor(#[from] FactorError),
+    /// The person asked to stop.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
+/// Moves the points of a linkage from `start` (millimetres, by point) to where its triangles are rigid, do not
+/// overlap, open no farther than `sigma`, and lie on the surface of `closest`.
+///
+/// # Errors
+/// [`RationalizeError`]: interruption, memory.
+pub fn rationalize(
+    linkage: &Linkage,
+    start: &[Point3<f64>],
+    closest: &ClosestPoint,
+    sigma: f64,
+    solver: Solver,
+    progress: &dyn Progress,
+) -> Result<(Vec<Point3<f64>>, Effort), RationalizeError> {
+    let problem = Problem::new(linkage, sigma);
+    match solver {
+        Solver::Exact => exact::solve(&problem, start, closest, linkage.edge_mm, progress),
+        Solver::Projection => {
+            projection::solve(&problem, start, closest, linkage.edge_mm, progress)
+        }
+    }
+}

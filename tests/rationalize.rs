@@ -1,0 +1,182 @@
+//! From sample surfaces to exact linkages, and what happens where σ forbids one.
+
+use kagome::base::progress::Silent;
+use kagome::conformal::{ConeRequest, FlattenOptions, Sizing, flatten};
+use kagome::linkage::{Built, Handedness, LinkageOptions, build};
+use kagome::mesh::{ClosestPoint, Sample, Surface};
+use kagome::rationalize::{Quality, Solver, rationalize};
+use proptest::prelude::*;
+
+struct Case {
+    surface: Surface,
+    built: Built,
+    sigma: f64,
+}
+
+fn case(
+    name: &str,
+    triangles: f64,
+    remove: usize,
+    cones: ConeRequest,
+    orientation: f64,
+    handedness: Handedness,
+) -> Case {
+    let surface = Sample::parse(name).unwrap().generate().unwrap();
+    let sigma = 2.0;
+    let options = FlattenOptions {
+        sigma,
+        cones,
+        sizing: Sizing::Triangles(triangles),
+        cone_clearance: if remove > 0 { 1.1 } else { 0.7 },
+    };
+    let flat = flatten(&surface, &options, &Silent).unwrap();
+    let options = LinkageOptions {
+        edge_mm: flat.edge_mm,
+        orientation,
+        handedness,
+        remove_at_cone: remove,
+        sigma,
+    };
+    let built = build(&surface, &flat.layout, &options, &Silent).unwrap();
+    Case {
+        surface,
+        built,
+        sigma,
+    }
+}
+
+impl Case {
+    fn solve(&self, solver: Solver) -> Quality {
+        let closest = ClosestPoint::new(&self.surface);
+        let linkage = &self.built.linkage;
+        let (positions, _) = rationalize(
+            linkage,
+            &self.built.start,
+            &closest,
+            self.sigma,
+            solver,
+            &Silent,
+        )
+        .unwrap();
+        Quality::measure(linkage, &positions, &self.surface, &closest, self.sigma)
+    }
+}
+
+fn assert_sound(q: &Quality, what: &str) {
+    assert!(
+        q.edge_error_max <= 1e-9,
+        "{what}: edges {:e}",
+        q.edge_error_max
+    );
+    assert!(
+        q.distance_max.value <= 0.1,
+        "{what}: distance {}",
+        q.distance_max.value
+    );
+    assert_eq!(
+        (q.penetrations, q.intersections, q.facing_away, q.over_sigma),
+        (0, 0, 0, 0),
+        "{what}"
+    );
+    assert!(q.coverage >= 0.9, "{what}: coverage {}", q.coverage);
+}
+
+#[test]
+fn what_is_within_reach_is_reached_exactly() {
+    for (name, remove) in [("hemisphere", 0), ("cap", 0), ("saddle", 0), ("bump", 4)] {
+        for handedness in [Handedness::Right, Handedness::Left] {
+            let case = case(name, 500.0, remove, ConeRequest::Auto, 0.0, handedness);
+            assert!(case.built.overlaps.is_empty());
+            assert_sound(&case.solve(Solver::Exact), name);
+        }
+    }
+}
+
+#[test]
+fn a_steep_bump_without_its_cone_keeps_its_edges_and_shows_the_distance() {
+    let case = case(
+        "bump",
+        700.0,
+        0,
+        ConeRequest::Given(vec![]),
+        0.0,
+        Handedness::Right,
+    );
+    let q = case.solve(Solver::Exact);
+    assert!(q.edge_error_max < 1e-6, "{:e}", q.edge_error_max);
+    assert!(q.distance_max.value > 0.5, "{}", q.distance_max.value);
+    // The place is the tip: within a few edges of the axis.
+    let [x, y, _] = q.distance_max.at_mm;
+    assert!(x.hypot(y) < 4.0 * q.edge_mm);
+}
+
+#[test]
+fn the_papers_projection_comes_close_and_the_exact_solve_closer() {
+    let case = case("cap", 500.0, 0, ConeRequest::Auto, 0.0, Handedness::Right);
+    let (exact, projection) = (case.solve(Solver::Exact), case.solve(Solver::Projection));
+    assert!(projection.edge_error_max < 1e-2 && projection.distance_max.value < 0.05);
+    assert_eq!(projection.penetrations, 0);
+    assert!(exact.edge_error_max < 1e-3 * projection.edge_error_max);
+}
+
+#[test]
+fn removing_triangles_at_the_cone_leaves_four_then_sixteen_fewer() {
+    let count = |remove| {
+        let case = case(
+            "bump",
+            800.0,
+            remove,
+            ConeRequest::Auto,
+            0.0,
+            Handedness::Right,
+        );
+        (
+            case.built.linkage.triangles.len() + case.built.lost,
+            case.built.removed,
+        )
+    };
+    // λ is normalised alike for both, so the lattices are the same.
+    let (with_four, four) = count(4);
+    let (with_sixteen, sixteen) = count(16);
+    assert_eq!((four, sixteen), (4, 16));
+    assert_eq!(with_four - with_sixteen, 12);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Any orientation, size and handedness: every triangle is held by two others at least, every seam hinge turns by
+    /// 120° and keeps colours, flat triangles are equilateral and distinct, and the solve ends exact.
+    #[test]
+    fn any_lattice_on_a_bump_is_consistent(
+        orientation in 0.0..6.3f64, triangles in 200.0..700.0f64, left: bool, remove in prop::sample::select(vec![0usize, 4, 16]),
+    ) {
+        let handedness = if left { Handedness::Left } else { Handedness::Right };
+        let case = case("bump", triangles, remove, ConeRequest::Auto, orientation, handedness);
+        let linkage = &case.built.linkage;
+        let edge = linkage.edge_mm;
+        for t in linkage.triangles.iter() {
+            for k in 0..3 {
+                prop_assert!(((t.flat[(k + 1) % 3] - t.flat[k]).norm() / edge - 1.0).abs() < 1e-9);
+            }
+            prop_assert!((t.flat[1] - t.flat[0]).perp(&(t.flat[2] - t.flat[0])) > 0.0);
+        }
+        for n in linkage.neighbours().iter() {
+            prop_assert!(n.iter().flatten().count() >= 2);
+        }
+        for h in linkage.hinges.iter() {
+            let (a, b) = (&linkage.triangles[h.ccw.triangle], &linkage.triangles[h.cw.triangle]);
+            prop_assert!(a.colour != b.colour);
+            // The slit edge as both triangles see it on the sheet.
+            let (i, j) = (h.ccw.corner, h.cw.corner);
+            let (mine, theirs) = (a.flat[(i + 2) % 3] - a.flat[i], b.flat[(j + 1) % 3] - b.flat[j]);
+            let turn = mine.perp(&theirs).atan2(mine.dot(&theirs)).to_degrees();
+            let expected = if h.seam { 120.0 } else { 0.0 };
+            prop_assert!((turn.abs() - expected).abs() < 1e-6, "turn {turn}, seam {}", h.seam);
+        }
+        prop_assert!(case.built.overlaps.is_empty());
+        let q = case.solve(Solver::Exact);
+        prop_assert!(q.edge_error_max < 1e-6);
+        prop_assert_eq!((q.penetrations, q.over_sigma), (0, 0));
+    }
+}
