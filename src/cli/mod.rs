@@ -3,7 +3,9 @@
 //! Exit codes: 0 done, 1 the answer is no, 2 bad usage or bad input. Results go to standard output (`--json` for
 //! machines), everything else to standard error.
 
+pub mod inspect;
 pub mod samples;
+pub mod surface_args;
 mod terminal;
 
 use std::ffi::OsString;
@@ -41,6 +43,8 @@ pub struct Global {
 
 #[derive(Subcommand)]
 enum Verb {
+    /// Show what a surface is like: topology, size, curvature, defects
+    Inspect(inspect::InspectArgs),
     /// List the sample surfaces, or write one as a file
     Samples(samples::SamplesArgs),
 }
@@ -73,6 +77,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     let terminal = Terminal::new(cli.global.quiet);
     let result = match &cli.verb {
+        Verb::Inspect(args) => inspect::run(args, &cli.global, &terminal),
         Verb::Samples(args) => samples::run(args, &cli.global, &terminal),
     };
     terminal.clear();

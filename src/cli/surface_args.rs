@@ -1,0 +1,90 @@
+//! The surface that a verb works on, and how its file is to be understood: shared by all verbs that take one.
+
+use clap::Args;
+
+use super::Failure;
+use crate::mesh::repair::{Import, ImportOptions, ImportReport, PartChoice, import_file};
+use crate::mesh::samples::Sample;
+use crate::mesh::units::{Unit, Units};
+
+/// A surface and its units.
+#[derive(Args, Clone, Debug)]
+pub struct SurfaceArgs {
+    /// OBJ, STL or PLY file, or sample:NAME[:key=value,…] (see `kagome samples list`)
+    #[arg(value_name = "SURFACE")]
+    pub surface: String,
+    /// What one unit in the file is: mm, cm, m or in
+    #[arg(long, default_value = "mm", value_name = "UNIT")]
+    pub unit: Unit,
+    /// A factor on top of the unit
+    #[arg(
+        long,
+        default_value_t = 1.0,
+        value_name = "S",
+        allow_negative_numbers = true
+    )]
+    pub scale: f64,
+    /// Make the longest side of the surface's box this long, instead of --unit and --scale
+    #[arg(long, value_name = "MM", conflicts_with_all = ["unit", "scale"], allow_negative_numbers = true)]
+    pub size: Option<f64>,
+    /// Which part to use if the surface has several
+    #[arg(long, value_name = "WHICH")]
+    pub part: Option<Part>,
+}
+
+/// Values of `--part`.
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The one with the most faces
+    Largest,
+}
+
+impl SurfaceArgs {
+    /// How the file is to be understood.
+    pub fn options(&self) -> ImportOptions {
+        ImportOptions {
+            units: Units {
+                unit: self.unit,
+                scale: self.scale,
+                size_mm: self.size,
+            },
+            parts: match self.part {
+                Some(Part::Largest) => PartChoice::Largest,
+                None => PartChoice::Refuse,
+            },
+        }
+    }
+
+    /// Reads the file, or makes the sample; `--unit`, `--scale` and `--size` hold for both.
+    ///
+    /// # Errors
+    /// [`Failure::Bad`] with what is wrong and what to do.
+    pub fn load(&self) -> Result<Import, Failure> {
+        let options = self.options();
+        if !self.surface.starts_with("sample:") {
+            return import_file(self.surface.as_ref(), &options).map_err(Failure::bad);
+        }
+        let sample = Sample::parse(&self.surface).map_err(Failure::bad)?;
+        let surface = sample.generate().map_err(Failure::bad)?;
+        let (low, high) = surface.bounds();
+        let factor = options
+            .units
+            .factor((high - low).max())
+            .map_err(|problem| Failure::Bad(format!("sample:{sample} {problem}")))?;
+        Ok(Import {
+            report: ImportReport {
+                format: "sample",
+                file_vertices: surface.positions().len(),
+                file_faces: surface.faces().len(),
+                parts: 1,
+                mm_per_unit: factor,
+                ..Default::default()
+            },
+            surface: if factor == 1.0 {
+                surface
+            } else {
+                surface.scaled(factor)
+            },
+        })
+    }
+}
