@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::Failure;
-use crate::mesh::repair::{Import, ImportOptions, ImportReport, PartChoice, import_file};
+use crate::mesh::repair::{Import, ImportOptions, PartChoice, import_file};
 use crate::mesh::samples::Sample;
 use crate::mesh::units::{Unit, Units};
 
@@ -65,26 +65,6 @@ impl SurfaceArgs {
             return import_file(self.surface.as_ref(), &options).map_err(Failure::bad);
         }
         let sample = Sample::parse(&self.surface).map_err(Failure::bad)?;
-        let surface = sample.generate().map_err(Failure::bad)?;
-        let (low, high) = surface.bounds();
-        let factor = options
-            .units
-            .factor((high - low).max())
-            .map_err(|problem| Failure::Bad(format!("sample:{sample} {problem}")))?;
-        Ok(Import {
-            report: ImportReport {
-                format: "sample",
-                file_vertices: surface.positions().len(),
-                file_faces: surface.faces().len(),
-                parts: 1,
-                mm_per_unit: factor,
-                ..Default::default()
-            },
-            surface: if factor == 1.0 {
-                surface
-            } else {
-                surface.scaled(factor)
-            },
-        })
+        sample.import(&options).map_err(Failure::bad)
     }
 }

@@ -43,6 +43,8 @@ pub struct FlattenOptions {
 pub struct Flattened {
     /// The layout, scaled so that λ's smallest value is `floor`.
     pub layout: Layout,
+    /// The layout before scaling, for [`Flattened::resize`].
+    unscaled: Layout,
     /// The metric behind it.
     pub metric: Metric,
     /// Triangle edge L, millimetres.
@@ -101,39 +103,67 @@ pub fn flatten(
     }
 }
 
-/// Scales a layout and chooses L. The two depend on each other through the neighbourhood of the cones that is left
-/// out; a few rounds settle it.
-fn size(surface: &Surface, layout: Layout, metric: Metric, options: &FlattenOptions) -> Flattened {
-    let cap = if layout.cones.is_empty() {
-        FLOOR_WITHOUT_CONES
-    } else {
-        FLOOR_WITH_CONES
-    };
-    let edge_for = |area: f64| match options.sizing {
-        Sizing::EdgeMm(edge) => edge,
-        Sizing::Triangles(count) => (area / (count * 0.75f64.sqrt() * 0.5)).sqrt(),
-    };
-    let mut sized = layout;
-    let mut edge_mm = edge_for(sized.area_mm2());
-    let mut floor = 1.0;
-    for _ in 0..20 {
-        let scale = sized.scale_summary(surface, options.cone_clearance * edge_mm, options.sigma);
-        floor = (options.sigma * scale.min / scale.max).clamp(1.0, cap);
-        let factor = scale.min / floor;
-        sized = sized.rescaled(factor);
-        let before = edge_mm;
-        edge_mm = edge_for(sized.area_mm2());
-        if (factor - 1.0).abs() < 1e-12 && (edge_mm / before - 1.0).abs() < 1e-12 {
-            break;
-        }
+/// Scales a layout and chooses L. Whatever chose L, the result is the one that this L alone would give, to the last
+/// bit: a design file that names the edge makes the same sheet again.
+fn size(
+    surface: &Surface,
+    unscaled: Layout,
+    metric: Metric,
+    options: &FlattenOptions,
+) -> Flattened {
+    let (mut layout, mut edge_mm, mut floor) = scaled(surface, &unscaled, options, options.sizing);
+    if let Sizing::Triangles(_) = options.sizing {
+        (layout, edge_mm, floor) = scaled(surface, &unscaled, options, Sizing::EdgeMm(edge_mm));
     }
-    let scale = sized.scale_summary(surface, options.cone_clearance * edge_mm, options.sigma);
+    let scale = layout.scale_summary(surface, options.cone_clearance * edge_mm, options.sigma);
     Flattened {
-        layout: sized,
+        layout,
+        unscaled,
         metric,
         edge_mm,
         scale,
         floor,
+    }
+}
+
+/// The layout at true size, L, and the smallest λ. Size and L depend on each other through the neighbourhood of the
+/// cones that is left out; a few rounds settle it.
+fn scaled(
+    surface: &Surface,
+    unscaled: &Layout,
+    options: &FlattenOptions,
+    sizing: Sizing,
+) -> (Layout, f64, f64) {
+    let cap = if unscaled.cones.is_empty() {
+        FLOOR_WITHOUT_CONES
+    } else {
+        FLOOR_WITH_CONES
+    };
+    let edge_for = |area: f64| match sizing {
+        Sizing::EdgeMm(edge) => edge,
+        Sizing::Triangles(count) => (area / (count * 0.75f64.sqrt() * 0.5)).sqrt(),
+    };
+    let mut layout = unscaled.clone();
+    let mut edge_mm = edge_for(layout.area_mm2());
+    let mut floor = 1.0;
+    for _ in 0..20 {
+        let scale = layout.scale_summary(surface, options.cone_clearance * edge_mm, options.sigma);
+        floor = (options.sigma * scale.min / scale.max).clamp(1.0, cap);
+        let factor = scale.min / floor;
+        layout = layout.rescaled(factor);
+        let before = edge_mm;
+        edge_mm = edge_for(layout.area_mm2());
+        if (factor - 1.0).abs() < 1e-12 && (edge_mm / before - 1.0).abs() < 1e-12 {
+            break;
+        }
+    }
+    (layout, edge_mm, floor)
+}
+
+impl Flattened {
+    /// The same map at another triangle size; nothing is solved again.
+    pub fn resize(self, surface: &Surface, options: &FlattenOptions) -> Self {
+        size(surface, self.unscaled, self.metric, options)
     }
 }
 

@@ -22,42 +22,48 @@ struct Stage {
     closeness: f64,
     anchor: f64,
     damping: f64,
+    /// The stage ends when a step gains less than this part of the energy.
+    gain: f64,
 }
 
 /// Closeness and anchor fade by powers of ten; each stage starts so near its solution that a few steps suffice. The
-/// last leaves a pull of 10⁻⁴, which bends the edges by no more than its square.
+/// last leaves a pull of 10⁻⁴, which bends the edges by no more than its square. Only the last is worth finishing: the
+/// others end at the first step that gains little.
 const STAGES: [Stage; 5] = [
     Stage {
         closeness: 0.3,
         anchor: 1e-2,
         damping: 1e-3,
+        gain: 2e-2,
     },
     Stage {
         closeness: 0.1,
         anchor: 3e-3,
         damping: 1e-4,
+        gain: 2e-2,
     },
     Stage {
         closeness: 0.01,
         anchor: 3e-4,
         damping: 1e-6,
+        gain: 2e-2,
     },
     Stage {
         closeness: 1e-3,
         anchor: 3e-5,
         damping: 1e-8,
+        gain: 2e-2,
     },
     Stage {
         closeness: 1e-4,
         anchor: 1e-6,
         damping: 1e-10,
+        gain: 1e-4,
     },
 ];
 
 /// Steps in one stage at the most. Feasible cases take 2–5; infeasible ones would creep on without end.
 const STEPS_PER_STAGE: usize = 12;
-/// A stage ends when a step gains less than this part of the energy.
-const SMALL_GAIN: f64 = 1e-4;
 
 /// What a solver did.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -381,7 +387,7 @@ impl<'a> System<'a> {
                 self.project(x);
                 break;
             }
-            if before - energy < SMALL_GAIN * before || energy < 1e-26 {
+            if before - energy < stage.gain * before || energy < 1e-26 {
                 break;
             }
         }

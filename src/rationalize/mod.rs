@@ -10,7 +10,7 @@ mod problem;
 mod projection;
 mod quality;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 pub use exact::Effort;
 pub use problem::Problem;
@@ -63,4 +63,15 @@ pub fn rationalize(
             projection::solve(&problem, start, closest, linkage.edge_mm, progress)
         }
     }
+}
+
+/// The scale factor λ of every hinge at `positions` (millimetres, by point), in the order of the linkage's hinges.
+pub fn hinge_scales(linkage: &Linkage, positions: &[Point3<f64>]) -> Vec<f64> {
+    let problem = Problem::new(linkage, 2.0);
+    let at = |i: u32| -> Vector3<f64> { positions[i as usize].coords / linkage.edge_mm };
+    problem
+        .hinges
+        .iter()
+        .map(|h| problem::hinge_scale(&h.map(at)).value)
+        .collect()
 }

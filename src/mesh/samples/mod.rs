@@ -25,6 +25,7 @@ pub use mask::Mask;
 pub use parameter::Parameter;
 pub use shapes::{Bump, Cap, Catenoid, Funnel, Hemisphere, Octasphere, Saddle, Torus, Vase};
 
+use super::repair::{Import, ImportOptions, ImportReport};
 use super::surface::{Surface, TopologyError};
 
 /// Why a sample cannot be made.
@@ -87,6 +88,14 @@ pub enum SampleError {
         sample: &'static str,
         /// Which ones, with their values.
         why: String,
+    },
+    /// The units asked for do not give a surface of a size that can be made.
+    #[error("sample:{sample} {problem}")]
+    Size {
+        /// The sample with its parameters.
+        sample: String,
+        /// What is wrong and what to do.
+        problem: String,
     },
     /// The triangles do not form a surface.
     #[error("sample {sample} cannot be meshed with these parameters ({source}); try more faces")]
@@ -220,6 +229,36 @@ impl Sample {
             sample: self.name(),
             source,
         })
+    }
+
+    /// Makes the surface in the size that `options` ask for, as [`super::import_file`] does for a file.
+    ///
+    /// # Errors
+    /// [`SampleError`] for parameters or units that cannot be used.
+    pub fn import(&self, options: &ImportOptions) -> Result<Import, SampleError> {
+        let surface = self.generate()?;
+        let (low, high) = surface.bounds();
+        let mm_per_unit = options
+            .units
+            .factor((high - low).max())
+            .map_err(|problem| SampleError::Size {
+                sample: self.to_string(),
+                problem: problem.to_string(),
+            })?;
+        let report = ImportReport {
+            format: "sample",
+            file_vertices: surface.positions().len(),
+            file_faces: surface.faces().len(),
+            parts: 1,
+            mm_per_unit,
+            ..Default::default()
+        };
+        let surface = if mm_per_unit == 1.0 {
+            surface
+        } else {
+            surface.scaled(mm_per_unit)
+        };
+        Ok(Import { surface, report })
     }
 }
 
