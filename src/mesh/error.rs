@@ -105,7 +105,7 @@ pub enum Problem {
     },
     /// An edge has more than two faces.
     #[error(
-        "is not manifold: {count} edges have more than two faces, the first between vertices {tail} and {head} with {faces} (one is face {face}); delete the extra faces (Blender: Select > All by Trait > Non Manifold)"
+        "is not manifold: the edge between vertices {tail} and {head} has {faces} faces (one is face {face}), and a surface has two at the most (such edges: {count}); delete the extra faces (Blender: Select > All by Trait > Non Manifold)"
     )]
     NotManifoldEdge {
         /// One end.
@@ -158,7 +158,7 @@ pub enum Problem {
         value: f64,
     },
     /// The surface is too small or too large to be meant in these units.
-    #[error("is {longest_mm} mm long at its longest side, which is {}; say what a unit of the file is with --unit mm|cm|m|in, or how long the longest side should be with --size MM", if *longest_mm < 1.0 { "less than 1 mm" } else { "more than 20 m" })]
+    #[error("is {} mm long at its longest side, which is {}; say what a unit of the file is with --unit mm|cm|m|in, or how long the longest side should be with --size MM", length(*longest_mm), if *longest_mm < 1.0 { "less than 1 mm" } else { "more than 20 m" })]
     OddSize {
         /// The longest side of its box in millimetres.
         longest_mm: f64,
@@ -166,4 +166,13 @@ pub enum Problem {
     /// The triangles do not form a surface for a reason not foreseen above.
     #[error("is no surface: {0}")]
     Topology(#[from] super::surface::TopologyError),
+}
+
+/// A length for reading: four decimals, or powers of ten where they would show nothing.
+fn length(mm: f64) -> String {
+    if (1e-3..1e7).contains(&mm) {
+        crate::base::units::short(mm, 4)
+    } else {
+        format!("{mm:.3e}")
+    }
 }

@@ -204,15 +204,15 @@ fn weld_exact(positions: &[Point3<f64>], faces: &mut [Face], report: &mut Import
     for corner in faces.iter().flat_map(|f| f.corners) {
         used[corner as usize] = true;
     }
-    let mut order: Vec<u32> = (0..positions.len() as u32)
-        .filter(|i| used[*i as usize])
-        .collect();
+    let mut order: Vec<u32> = (0..positions.len() as u32).collect();
     order.sort_unstable_by_key(|i| (key(*i), *i));
     let mut target: Vec<u32> = (0..positions.len() as u32).collect();
     for group in order.chunk_by(|a, b| key(*a) == key(*b)) {
+        if group.iter().any(|i| used[*i as usize]) {
+            report.welded += group.len() - 1;
+        }
         for other in &group[1..] {
             target[*other as usize] = group[0];
-            report.welded += 1;
         }
     }
     redirect(faces, &target);

@@ -1,4 +1,5 @@
 //! OBJ through tobj, after a look at every line: tobj takes NaN for a number and does not say where it stumbled.
+//! It is given positions and faces alone, so that colours, normals, groups and materials cannot make it stumble.
 
 use std::collections::HashMap;
 
@@ -10,15 +11,21 @@ pub(super) fn read(bytes: &[u8]) -> Result<Soup, Located> {
     let mut soup = Soup::new(Format::Obj);
     // Names and comments may be in another encoding; nothing else is.
     let text = String::from_utf8_lossy(bytes);
-    soup.positions = scan(&text)?;
+    let Scan {
+        positions,
+        clean,
+        polygons,
+        faces: file_faces,
+    } = scan(&text)?;
+    soup.positions = positions;
+    let mut file_numbers = polygons.into_iter();
     let options = tobj::LoadOptions {
         ignore_points: true,
         ignore_lines: true,
         ..Default::default()
     };
-    // Materials are of no interest: a library that is missing is not an error.
     let (models, _) =
-        tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| Ok(Default::default())).map_err(
+        tobj::load_obj_buf(&mut clean.as_bytes(), &options, |_| Ok(Default::default())).map_err(
             |error| {
                 anywhere(Problem::Syntax {
                     format: "OBJ",
@@ -26,7 +33,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Soup, Located> {
                 })
             },
         )?;
-    // Every group is a mesh with vertices renumbered: the file's own numbers come back by exact position.
+    // A mesh has its vertices renumbered: the file's own numbers come back by exact position.
     let mut number: HashMap<[u64; 3], u32> = HashMap::with_capacity(soup.positions.len());
     for (i, p) in soup.positions.iter().enumerate() {
         number.entry(bits(p)).or_insert(i as u32);
@@ -44,6 +51,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Soup, Located> {
         };
         for face in 0..faces {
             polygon.clear();
+            soup.file_faces = file_numbers.next().unwrap_or(soup.file_faces);
             for &corner in corners.by_ref().take(arity(face)) {
                 let at = 3 * corner as usize;
                 let vertex = mesh
@@ -61,6 +69,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Soup, Located> {
             soup.push_polygon(&polygon).map_err(anywhere)?;
         }
     }
+    soup.file_faces = file_faces;
     Ok(soup)
 }
 
@@ -69,9 +78,22 @@ fn bits(p: &Point3<f64>) -> [u64; 3] {
     [p.x, p.y, p.z].map(|x| (x + 0.0).to_bits())
 }
 
-/// All vertices, once every number and index is known to be good.
-fn scan(text: &str) -> Result<Vec<Point3<f64>>, Located> {
+/// What a first look at a file gives.
+struct Scan {
+    positions: Vec<Point3<f64>>,
+    /// The lines that tobj needs.
+    clean: String,
+    /// The number in the file, from 0, of each face that has three corners or more.
+    polygons: Vec<usize>,
+    /// Faces in the file.
+    faces: usize,
+}
+
+/// Looks at every number and index.
+fn scan(text: &str) -> Result<Scan, Located> {
+    let mut polygons = Vec::new();
     let mut positions = Vec::new();
+    let mut clean = String::with_capacity(text.len());
     // The largest index asked for: vertices may follow the faces that use them.
     let mut most: Option<(usize, usize, i64)> = None;
     let mut faces = 0;
@@ -80,10 +102,16 @@ fn scan(text: &str) -> Result<Vec<Point3<f64>>, Located> {
         let mut words = line.split_whitespace();
         match words.next() {
             Some("v") => {
-                positions.push(Point3::from(three(words).map_err(here)?));
+                positions.push(Point3::from(three(words.clone()).map_err(here)?));
+                clean.push('v');
+                words.take(3).for_each(|word| append(&mut clean, word));
+                clean.push('\n');
             }
             Some("f") => {
                 faces += 1;
+                let before = clean.len();
+                let mut corners = 0;
+                clean.push('f');
                 for word in words.take_while(|w| !w.starts_with('#')) {
                     let bad = || {
                         here(Problem::BadIndex {
@@ -92,11 +120,8 @@ fn scan(text: &str) -> Result<Vec<Point3<f64>>, Located> {
                             vertices: positions.len(),
                         })
                     };
-                    let index: i64 = word
-                        .split('/')
-                        .next()
-                        .and_then(|w| w.parse().ok())
-                        .ok_or_else(bad)?;
+                    let position = word.split('/').next().unwrap_or(word);
+                    let index: i64 = position.parse().map_err(|_| bad())?;
                     // Negative indices count back from the last vertex so far.
                     if index == 0 || index < -(positions.len() as i64) {
                         return Err(bad());
@@ -104,6 +129,15 @@ fn scan(text: &str) -> Result<Vec<Point3<f64>>, Located> {
                     if most.is_none_or(|m| index > m.2) {
                         most = Some((at + 1, faces, index));
                     }
+                    append(&mut clean, position);
+                    corners += 1;
+                }
+                clean.push('\n');
+                if corners >= 3 {
+                    polygons.push(faces - 1);
+                } else {
+                    // Points and lines written as faces are no part of a surface.
+                    clean.truncate(before);
                 }
             }
             _ => {}
@@ -118,6 +152,16 @@ fn scan(text: &str) -> Result<Vec<Point3<f64>>, Located> {
                 vertices: positions.len(),
             },
         )),
-        _ => Ok(positions),
+        _ => Ok(Scan {
+            positions,
+            clean,
+            polygons,
+            faces,
+        }),
     }
+}
+
+fn append(text: &mut String, word: &str) {
+    text.push(' ');
+    text.push_str(word);
 }

@@ -19,7 +19,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Soup, Located> {
     };
     let ply = Parser::<DefaultElement>::new()
         .read_ply(&mut &bytes[..])
-        .map_err(|e| syntax(e.line(), e.to_string()))?;
+        .map_err(|e| {
+            let words: Vec<String> = e.to_string().split_whitespace().map(String::from).collect();
+            syntax(e.line(), words.join(" "))
+        })?;
     let elements = |name: &str| {
         ply.payload
             .get(name)

@@ -2,11 +2,15 @@
 
 use nalgebra::{Point2, Point3, Vector3};
 
-/// Corners beyond which a polygon is refused: clipping takes their square.
-const MOST_CORNERS: usize = 5_000;
+/// Corners beyond which a polygon is refused: clipping takes their cube at worst.
+const MOST_CORNERS: usize = 1_000;
+
+/// Quality (doubled area over the sum of squared sides; 0.58 is equilateral) below which an ear is taken for a
+/// straight line: far above rounding, far below any triangle that is meant.
+const FLAT: f64 = 1e-9;
 
 /// Appends the triangles of a polygon with the same sense of rotation. `None` if it crosses itself, has no area or
-/// more than 5 000 corners. Triangles pass through unseen, whatever their shape.
+/// more than 1 000 corners. Triangles pass through unseen, whatever their shape.
 pub(super) fn triangulate(
     positions: &[Point3<f64>],
     corners: &[u32],
@@ -53,33 +57,44 @@ fn project(positions: &[Point3<f64>], corners: &[u32]) -> Option<Vec<Point2<f64>
     )
 }
 
+/// Always the best-shaped ear: corners on a straight side would else be left over as triangles without area.
 fn clip(flat: &[Point2<f64>], corners: &[u32], out: &mut Vec<[u32; 3]>) -> Option<()> {
     let turn = |a: usize, b: usize, c: usize| (flat[b] - flat[a]).perp(&(flat[c] - flat[b]));
+    let quality = |[a, b, c]: [usize; 3]| {
+        let squares = (flat[b] - flat[a]).norm_squared()
+            + (flat[c] - flat[b]).norm_squared()
+            + (flat[a] - flat[c]).norm_squared();
+        turn(a, b, c) / squares
+    };
     let mut left: Vec<usize> = (0..corners.len()).collect();
-    let mut start = 0;
-    while left.len() > 3 {
+    while left.len() >= 3 {
         let n = left.len();
-        let ear = (0..n).map(|i| (start + i) % n).find(|&i| {
-            let [a, b, c] = [left[(i + n - 1) % n], left[i], left[(i + 1) % n]];
-            turn(a, b, c) > 0.0
-                && left.iter().all(|&p| {
+        let ear_at = |i: usize| [left[(i + n - 1) % n], left[i], left[(i + 1) % n]];
+        let mut best = (FLAT, None);
+        for i in 0..n {
+            let ear = ear_at(i);
+            let [a, b, c] = ear;
+            let shape = quality(ear);
+            let empty = || {
+                left.iter().all(|&p| {
                     // A corner that is met twice (a bridge to a hole) does not block its own copies.
-                    [a, b, c].iter().any(|&q| flat[q] == flat[p])
+                    ear.iter().any(|&q| flat[q] == flat[p])
                         || turn(a, b, p) < 0.0
                         || turn(b, c, p) < 0.0
                         || turn(c, a, p) < 0.0
                 })
-        })?;
-        let [a, b, c] = [left[(ear + n - 1) % n], left[ear], left[(ear + 1) % n]];
-        out.push([corners[a], corners[b], corners[c]]);
+            };
+            if shape > best.0 && empty() {
+                best = (shape, Some(i));
+            }
+        }
+        let ear = best.1?;
+        out.push(ear_at(ear).map(|i| corners[i]));
         left.remove(ear);
-        start = ear % left.len();
+        if n == 3 {
+            break;
+        }
     }
-    let [a, b, c] = [left[0], left[1], left[2]];
-    if turn(a, b, c) <= 0.0 {
-        return None;
-    }
-    out.push([corners[a], corners[b], corners[c]]);
     Some(())
 }
 
