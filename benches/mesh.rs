@@ -12,6 +12,7 @@ fn main() {
     divan::main();
 }
 
+#[expect(clippy::expect_used, reason = "every text below names a sample")]
 fn sample(text: &str) -> Surface {
     Sample::parse(text)
         .and_then(|s| s.generate())

@@ -229,7 +229,7 @@ fn redirect(faces: &mut [Face], target: &[u32]) {
 const CRACK: f64 = 1e-6;
 
 /// Joins vertices on rims that are closer than a rounding error, if that leaves less rim.
-fn weld_cracks(positions: &[Point3<f64>], faces: &mut Vec<Face>, report: &mut ImportReport) {
+fn weld_cracks(positions: &[Point3<f64>], faces: &mut [Face], report: &mut ImportReport) {
     let rim = |faces: &[Face]| -> Vec<u32> {
         let mut ends: Vec<u32> = edges(faces)
             .chunk_by(same_edge)
@@ -266,7 +266,7 @@ fn weld_cracks(positions: &[Point3<f64>], faces: &mut Vec<Face>, report: &mut Im
             }
         }
     }
-    let mut closed = faces.clone();
+    let mut closed = faces.to_vec();
     redirect(&mut closed, &target);
     closed.retain(|f| !names_twice(&f.corners));
     if joined > 0 && rim(&closed).len() + joined < before.len() {
@@ -451,8 +451,8 @@ fn orient(
     while let Some(&face) = queue.get(next) {
         next += 1;
         let own = turned[face] == Some(true);
-        for h in 3 * face..3 * face + 3 {
-            let other = across[h];
+        for (k, &other) in across[3 * face..3 * face + 3].iter().enumerate() {
+            let h = 3 * face + k;
             if other == usize::MAX {
                 continue;
             }

@@ -48,7 +48,7 @@ impl HalfedgeId {
     /// The side before this one in the same face.
     #[inline]
     pub fn prev(self) -> Self {
-        if self.0 % 3 == 0 {
+        if self.0.is_multiple_of(3) {
             Self(self.0 + 2)
         } else {
             Self(self.0 - 1)
