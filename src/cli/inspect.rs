@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::surface_args::SurfaceArgs;
-use super::{Failure, Global, Terminal};
+use super::{Failure, Global, Terminal, print};
 use crate::mesh::Import;
 use crate::mesh::check::Inspection;
 
@@ -34,9 +34,9 @@ pub fn run(args: &InspectArgs, global: &Global, _terminal: &Terminal) -> Result<
             "kind": found.kind(),
             "figures": found,
         });
-        println!("{result:#}");
+        print(&format!("{result:#}\n"));
     } else {
-        print!("{}", text(&args.surface.surface, &import, &found));
+        print(&text(&args.surface.surface, &import, &found));
     }
     Ok(())
 }

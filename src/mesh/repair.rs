@@ -8,7 +8,7 @@
 
 use std::path::Path;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::error::{ImportError, Problem};
 use super::read::{Format, Soup, read_bytes, read_file};
@@ -245,21 +245,19 @@ fn weld_cracks(positions: &[Point3<f64>], faces: &mut [Face], report: &mut Impor
         return;
     }
     let limit = CRACK * longest_side(positions, faces);
+    // Sorted along a direction that no box is aligned with, near vertices are near in the list, and few others are.
+    let direction = Vector3::new(0.6029, 0.5377, 0.5894);
+    let along = |i: u32| positions[i as usize].coords.dot(&direction);
     let mut order = before.clone();
-    order.sort_unstable_by(|a, b| {
-        positions[*a as usize]
-            .x
-            .total_cmp(&positions[*b as usize].x)
-            .then(a.cmp(b))
-    });
+    order.sort_unstable_by(|a, b| along(*a).total_cmp(&along(*b)).then(a.cmp(b)));
     let mut target: Vec<u32> = (0..positions.len() as u32).collect();
     let mut joined = 0;
     for (i, &a) in order.iter().enumerate() {
         for &b in &order[i + 1..] {
-            let gap = positions[b as usize] - positions[a as usize];
-            if gap.x > limit {
+            if along(b) - along(a) > limit {
                 break;
             }
+            let gap = positions[b as usize] - positions[a as usize];
             if gap.norm() <= limit && target[b as usize] == b {
                 target[b as usize] = target[a as usize];
                 joined += 1;

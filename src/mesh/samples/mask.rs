@@ -9,7 +9,7 @@ use super::revolve::{Arrays, Ends, revolve};
 
 parameters! {
     /// A face: forehead, brows, closed eyes, nose, cheeks, lips and chin on an oval dome. With the defaults
-    /// max λ / min λ is 2.3 without a cone, and 1.8 with one at the tip of the nose, outside the nearest 7 mm.
+    /// max λ / min λ is 2.3 without a cone, and 1.8 with one at the tip of the nose, outside the nearest 5 mm.
     Mask {
         /// height from chin to crown
         height_mm = 200.0 in 1.0..=10000.0,

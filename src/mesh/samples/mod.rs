@@ -90,7 +90,7 @@ pub enum SampleError {
         why: String,
     },
     /// The units asked for do not give a surface of a size that can be made.
-    #[error("sample:{sample} {problem}")]
+    #[error("sample:{sample}: {problem}")]
     Size {
         /// The sample with its parameters.
         sample: String,
