@@ -7,4 +7,6 @@ pub mod linkage;
 pub mod machine;
 pub mod material;
 pub mod mesh;
+pub mod pattern;
 pub mod rationalize;
+pub mod toolpath;

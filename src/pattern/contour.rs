@@ -1,0 +1,146 @@
+//! The edges of the finished part: boundary loops of the union of the flat triangles.
+
+use std::collections::BTreeMap;
+
+use kurbo::Point;
+
+use super::sheet::{Contour, PatternError, signed_area};
+use crate::base::ids::{Id, Per};
+use crate::linkage::TriangleId;
+
+/// Two flat corners closer than this (in L) are one point: lattice positions are exact to rounding.
+const SAME_POINT: f64 = 1e-6;
+
+/// Traces every gap of the sheet once, material on the left.
+///
+/// At a pinch, where fans of triangles touch only in a point, the loop continues along the *same gap*, into the next
+/// fan: that keeps every loop simple, whereas a loop that stayed with its fan would run through the point twice.
+pub(super) fn trace(
+    triangles: &[[Point; 3]],
+    neighbours: &Per<TriangleId, [Option<(TriangleId, usize)>; 3]>,
+    edge_mm: f64,
+) -> Result<Vec<Contour>, PatternError> {
+    let mut sides: Vec<(Point, Point)> = Vec::new();
+    for (t, across) in neighbours.iter_ids() {
+        for k in (0..3).filter(|k| across[*k].is_none()) {
+            let corners = &triangles[t.index()];
+            sides.push((corners[k], corners[(k + 1) % 3]));
+        }
+    }
+    let leaving = Leaving::new(&sides, edge_mm);
+    let mut done = vec![false; sides.len()];
+    let mut contours = Vec::new();
+    for first in 0..sides.len() {
+        if done[first] {
+            continue;
+        }
+        let mut points = Vec::new();
+        let mut side = first;
+        while !done[side] {
+            done[side] = true;
+            points.push(sides[side].0);
+            let (tail, head) = sides[side];
+            let next = leaving.next_in_gap(&sides, tail, head, &done, first);
+            side = next.ok_or(PatternError::OpenRim {
+                x: head.x,
+                y: head.y,
+            })?;
+        }
+        if side != first {
+            let at = sides[side].0;
+            return Err(PatternError::OpenRim { x: at.x, y: at.y });
+        }
+        let points = merge_collinear(&points);
+        let outer = signed_area(&points) > 0.0;
+        contours.push(Contour { points, outer });
+    }
+    Ok(contours)
+}
+
+/// Boundary sides by the point where they start.
+struct Leaving {
+    cells: BTreeMap<(i64, i64), Vec<u32>>,
+    cell_mm: f64,
+    same_mm: f64,
+}
+
+impl Leaving {
+    fn new(sides: &[(Point, Point)], edge_mm: f64) -> Self {
+        let mut this = Self {
+            cells: BTreeMap::new(),
+            // Any size between the rounding of one point and the distance of two.
+            cell_mm: 0.25 * edge_mm,
+            same_mm: SAME_POINT * edge_mm,
+        };
+        for (i, (tail, _)) in sides.iter().enumerate() {
+            let key = this.key(*tail, 0.0, 0.0);
+            this.cells.entry(key).or_default().push(i as u32);
+        }
+        this
+    }
+
+    fn key(&self, p: Point, dx: f64, dy: f64) -> (i64, i64) {
+        (
+            ((p.x + dx) / self.cell_mm).floor() as i64,
+            ((p.y + dy) / self.cell_mm).floor() as i64,
+        )
+    }
+
+    /// Of the sides that leave `head`, the first one counter-clockwise from the side that arrives from `tail`: between
+    /// the two lies the gap on the right of both. The first side of the loop may be met again; others only once.
+    fn next_in_gap(
+        &self,
+        sides: &[(Point, Point)],
+        tail: Point,
+        head: Point,
+        done: &[bool],
+        first: usize,
+    ) -> Option<usize> {
+        let mut keys = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)]
+            .map(|(x, y)| self.key(head, x * self.same_mm, y * self.same_mm));
+        keys.sort_unstable();
+        let back = (tail - head).atan2();
+        let mut best: Option<(f64, usize)> = None;
+        for (i, key) in keys.iter().enumerate() {
+            if i > 0 && keys[i - 1] == *key {
+                continue;
+            }
+            for &s in self.cells.get(key).into_iter().flatten() {
+                let s = s as usize;
+                if (done[s] && s != first) || sides[s].0.distance(head) > self.same_mm {
+                    continue;
+                }
+                let turn =
+                    ((sides[s].1 - sides[s].0).atan2() - back).rem_euclid(std::f64::consts::TAU);
+                // Straight back is a slot of no width: a whole turn, rounding aside.
+                let turn = if turn < 1e-6 {
+                    std::f64::consts::TAU
+                } else {
+                    turn
+                };
+                if best.is_none_or(|(least, _)| turn < least) {
+                    best = Some((turn, s));
+                }
+            }
+        }
+        best.map(|(_, s)| s)
+    }
+}
+
+/// Drops points where the line goes straight on.
+fn merge_collinear(points: &[Point]) -> Vec<Point> {
+    let n = points.len();
+    let kept: Vec<Point> = (0..n)
+        .filter(|&i| {
+            let (a, b, c) = (points[(i + n - 1) % n], points[i], points[(i + 1) % n]);
+            let (u, v) = ((b - a).normalize(), (c - b).normalize());
+            u.cross(v).abs() > 1e-6 || u.dot(v) < 0.0
+        })
+        .map(|i| points[i])
+        .collect();
+    if kept.len() < 3 {
+        points.to_vec()
+    } else {
+        kept
+    }
+}

@@ -1,0 +1,15 @@
+//! Stage 5: a linkage becomes the sheet that is cut: slits, contours, and the drawing of both.
+//!
+//! A [`Sheet`] is what the finished part looks like: slits as centre lines, contours as the exact edge that remains.
+//! Width of the beam matters twice: it sets where a slit must stop so that its ligament is exactly the hinge width,
+//! and the toolpath keeps half of it away from a contour. Frame: millimetres, X right, Y up, seen from the side that
+//! the beam strikes; material on the left of every contour.
+
+mod contour;
+mod place;
+mod sheet;
+mod svg;
+
+pub use place::{Motion, placed};
+pub use sheet::{Contour, Figures, MAX_NECK, PatternError, Sheet, SheetMetadata, Slit};
+pub use svg::{SvgError, read_svg, svg};

@@ -1,0 +1,497 @@
+//! Slits whose ligaments are exactly as wide as asked, and the sheet around them.
+
+use std::collections::BTreeMap;
+
+use kurbo::{Point, Rect};
+
+use super::contour;
+use crate::base::ids::{Id, Per};
+use crate::linkage::{Linkage, Triangle, TriangleId};
+
+/// Largest neck c (the uncut end of a slit's lattice edge) in edge lengths.
+///
+/// Up to 2/3 the narrowest ligament is the one that the formula knows; beyond 1/2 the slit is shorter than its neck, the
+/// triangles hardly turn, and nothing of the linkage is left.
+pub const MAX_NECK: f64 = 0.5;
+
+/// One slit: an open cut on its centre line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slit {
+    /// The end at a lattice vertex, where up to three slits meet.
+    pub tail: Point,
+    /// The end before the hinge.
+    pub tip: Point,
+    /// The star: slits with the same number have one tail. Counted from 0 without gaps.
+    pub star: u32,
+}
+
+/// A closed edge of the finished part, first point not repeated, material on the left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contour {
+    /// Corners, at least three, no two neighbouring edges collinear.
+    pub points: Vec<Point>,
+    /// True: counter-clockwise, the rim of a part. False: clockwise, a hole.
+    pub outer: bool,
+}
+
+/// The numbers that belong to a sheet and not to its drawing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SheetMetadata {
+    /// Width h of the narrowest ligament, millimetres.
+    pub hinge_width_mm: f64,
+    /// Width k of the cut, millimetres.
+    pub kerf_mm: f64,
+    /// Triangle edge L, millimetres.
+    pub edge_mm: f64,
+}
+
+/// A sheet to be cut.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sheet {
+    /// All slits, star by star.
+    pub slits: Vec<Slit>,
+    /// All contours.
+    pub contours: Vec<Contour>,
+    /// The triangles, for the eye; never cut.
+    pub triangles: Vec<[Point; 3]>,
+    /// Hinge width, kerf, edge.
+    pub metadata: SheetMetadata,
+}
+
+/// What a sheet amounts to.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Figures {
+    /// Number of triangles.
+    pub triangles: usize,
+    /// Number of slits.
+    pub slits: usize,
+    /// Number of stars.
+    pub stars: usize,
+    /// Number of closed contours.
+    pub contours: usize,
+    /// Total length of the slits, millimetres.
+    pub slit_length_mm: f64,
+    /// Total length of the contours, millimetres.
+    pub contour_length_mm: f64,
+    /// Area inside the contours, square millimetres.
+    pub area_mm2: f64,
+    /// Width of the box, millimetres.
+    pub width_mm: f64,
+    /// Height of the box, millimetres.
+    pub height_mm: f64,
+}
+
+/// Why a linkage gives no sheet. Positions are in the sheet's frame, millimetres.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PatternError {
+    /// Nothing to cut.
+    #[error("the linkage has no triangles: nothing is left to cut")]
+    Empty,
+    /// A width is negative, zero or not a number.
+    #[error("the {what} is {value_mm} mm; it must be a plain number above 0")]
+    Width {
+        /// `hinge width`, `kerf`, `edge length`, `margin`.
+        what: &'static str,
+        /// The value.
+        value_mm: f64,
+    },
+    /// The ligaments leave no room for slits.
+    #[error(
+        "a hinge {hinge_width_mm} mm wide and a kerf of {kerf_mm} mm need triangles with edges of {least_edge_mm:.3} mm or more; these have {edge_mm:.3} mm. Make the triangles larger (--edge, or fewer --triangles){}", narrower(*.largest_hinge_mm)
+    )]
+    TooWide {
+        /// Hinge width asked for.
+        hinge_width_mm: f64,
+        /// Kerf.
+        kerf_mm: f64,
+        /// Edge of the triangles.
+        edge_mm: f64,
+        /// Smallest edge that would do.
+        least_edge_mm: f64,
+        /// Widest hinge that this edge allows; negative if the kerf alone is too wide.
+        largest_hinge_mm: f64,
+    },
+    /// Two triangles lie on top of each other.
+    #[error(
+        "the flat sheet overlaps itself: triangles {first} and {second} lie on one another near ({x:.3}, {y:.3}) mm. Move the cut or the cones so that the layout lies flat without overlap"
+    )]
+    Overlap {
+        /// One triangle.
+        first: TriangleId,
+        /// The other.
+        second: TriangleId,
+        /// Where.
+        x: f64,
+        /// Where.
+        y: f64,
+    },
+    /// The boundary sides do not close to loops.
+    #[error("the rim of the sheet does not close near ({x:.3}, {y:.3}) mm")]
+    OpenRim {
+        /// Where.
+        x: f64,
+        /// Where.
+        y: f64,
+    },
+    /// Larger than the bed.
+    #[error(
+        "the sheet is {width_mm:.1} x {height_mm:.1} mm with its cut, and the bed has {bed_width_mm:.1} x {bed_height_mm:.1} mm inside its margins, either way round. It fits with triangles of edge {fitting_edge_mm:.3} mm or less in the same number (--scale {fitting_scale:.4} of this size), or on a larger machine"
+    )]
+    TooLarge {
+        /// Width with half a cut on each side.
+        width_mm: f64,
+        /// Height with half a cut on each side.
+        height_mm: f64,
+        /// Bed inside its margins.
+        bed_width_mm: f64,
+        /// Bed inside its margins.
+        bed_height_mm: f64,
+        /// Edge with which the same pattern fits.
+        fitting_edge_mm: f64,
+        /// Scale with which the same pattern fits.
+        fitting_scale: f64,
+    },
+}
+
+fn narrower(largest_hinge_mm: f64) -> String {
+    if largest_hinge_mm > 0.0 {
+        format!(", or the hinge at most {largest_hinge_mm:.3} mm wide (--hinge)")
+    } else {
+        ": the kerf alone is too wide for them".into()
+    }
+}
+
+/// Checks that a width can be calculated with.
+pub(super) fn check_width(what: &'static str, value_mm: f64) -> Result<(), PatternError> {
+    if value_mm.is_finite() && value_mm > 0.0 {
+        Ok(())
+    } else {
+        Err(PatternError::Width { what, value_mm })
+    }
+}
+
+impl SheetMetadata {
+    /// How far before its hinge a slit stops: c = (2/√3)(h + k).
+    ///
+    /// The neighbouring arms leave the hinge's vertex at ±60° from the slit, so its tip is c · sin 60° = h + k from
+    /// their centre lines: half a kerf is burnt from each side, and h remains.
+    pub fn neck_mm(&self) -> f64 {
+        (self.hinge_width_mm + self.kerf_mm) / 0.75f64.sqrt()
+    }
+
+    fn check(&self) -> Result<(), PatternError> {
+        check_width("hinge width", self.hinge_width_mm)?;
+        check_width("kerf", self.kerf_mm)?;
+        check_width("edge length", self.edge_mm)?;
+        if self.neck_mm() > MAX_NECK * self.edge_mm {
+            return Err(PatternError::TooWide {
+                hinge_width_mm: self.hinge_width_mm,
+                kerf_mm: self.kerf_mm,
+                edge_mm: self.edge_mm,
+                least_edge_mm: self.neck_mm() / MAX_NECK,
+                largest_hinge_mm: MAX_NECK * self.edge_mm * 0.75f64.sqrt() - self.kerf_mm,
+            });
+        }
+        Ok(())
+    }
+}
+
+impl Sheet {
+    /// The sheet of a linkage in the frame of its flat positions, for a hinge width and a kerf.
+    ///
+    /// # Errors
+    /// [`PatternError`]: nothing to cut, widths that the triangles do not allow, a layout that overlaps itself.
+    pub fn new(linkage: &Linkage, hinge_width_mm: f64, kerf_mm: f64) -> Result<Self, PatternError> {
+        let metadata = SheetMetadata {
+            hinge_width_mm,
+            kerf_mm,
+            edge_mm: linkage.edge_mm,
+        };
+        metadata.check()?;
+        if linkage.triangles.is_empty() {
+            return Err(PatternError::Empty);
+        }
+        let triangles: Vec<[Point; 3]> = linkage
+            .triangles
+            .iter()
+            .map(|t| t.flat.map(|p| Point::new(p.x, p.y)))
+            .collect();
+        check_overlap(&triangles, linkage.edge_mm)?;
+        let neighbours = linkage.flat_neighbours();
+        Ok(Self {
+            slits: slits(linkage, &neighbours, metadata.neck_mm()),
+            contours: contour::trace(&triangles, &neighbours, linkage.edge_mm)?,
+            triangles,
+            metadata,
+        })
+    }
+
+    /// The smallest rectangle around all contours.
+    pub fn bounds(&self) -> Rect {
+        let mut points = self.contours.iter().flat_map(|c| &c.points);
+        let Some(first) = points.next() else {
+            return Rect::ZERO;
+        };
+        points.fold(Rect::from_points(*first, *first), |r, p| r.union_pt(*p))
+    }
+
+    /// Counts, lengths, area.
+    pub fn figures(&self) -> Figures {
+        let bounds = self.bounds();
+        Figures {
+            triangles: self.triangles.len(),
+            slits: self.slits.len(),
+            stars: self
+                .slits
+                .iter()
+                .map(|s| s.star as usize + 1)
+                .max()
+                .unwrap_or(0),
+            contours: self.contours.len(),
+            slit_length_mm: self.slits.iter().map(|s| s.tail.distance(s.tip)).sum(),
+            contour_length_mm: self
+                .contours
+                .iter()
+                .flat_map(|c| edges(&c.points))
+                .map(|(a, b)| a.distance(b))
+                .sum(),
+            area_mm2: self.contours.iter().map(|c| signed_area(&c.points)).sum(),
+            width_mm: bounds.width(),
+            height_mm: bounds.height(),
+        }
+    }
+}
+
+/// The sides of a closed polyline.
+pub(crate) fn edges(points: &[Point]) -> impl Iterator<Item = (Point, Point)> + '_ {
+    (0..points.len()).map(|i| (points[i], points[(i + 1) % points.len()]))
+}
+
+/// Area inside a closed polyline, negative if it runs clockwise.
+pub(crate) fn signed_area(points: &[Point]) -> f64 {
+    edges(points)
+        .map(|(a, b)| 0.5 * a.to_vec2().cross(b.to_vec2()))
+        .sum()
+}
+
+/// The slits of all hinges that the sheet does not cut open, star by star.
+fn slits(
+    linkage: &Linkage,
+    neighbours: &Per<TriangleId, [Option<(TriangleId, usize)>; 3]>,
+    neck_mm: f64,
+) -> Vec<Slit> {
+    let vertex = flat_vertices(&linkage.triangles, neighbours);
+    let mut found: Vec<(u32, usize, Point, Point)> = Vec::with_capacity(linkage.hinges.len());
+    for (order, hinge) in linkage.hinges.iter().enumerate().filter(|(_, h)| !h.seam) {
+        let flat = &linkage.triangles[hinge.ccw.triangle].flat;
+        let (from, to) = ((hinge.ccw.corner + 2) % 3, hinge.ccw.corner);
+        let (a, b) = (
+            Point::new(flat[from].x, flat[from].y),
+            Point::new(flat[to].x, flat[to].y),
+        );
+        let tip = b + (a - b).normalize() * neck_mm;
+        found.push((vertex[hinge.ccw.triangle.index() * 3 + from], order, a, tip));
+    }
+    found.sort_by_key(|&(star, order, ..)| (star, order));
+    let mut numbers = BTreeMap::new();
+    found
+        .into_iter()
+        .map(|(root, _, tail, tip)| {
+            let next = numbers.len() as u32;
+            Slit {
+                tail,
+                tip,
+                star: *numbers.entry(root).or_insert(next),
+            }
+        })
+        .collect()
+}
+
+/// For corner `k` of triangle `t` at `3 t + k`: a number shared by all corners of one fan around one point.
+fn flat_vertices(
+    triangles: &Per<TriangleId, Triangle>,
+    neighbours: &Per<TriangleId, [Option<(TriangleId, usize)>; 3]>,
+) -> Vec<u32> {
+    let mut parent: Vec<u32> = (0..3 * triangles.len() as u32).collect();
+    fn root(parent: &mut [u32], mut i: u32) -> u32 {
+        while parent[i as usize] != i {
+            parent[i as usize] = parent[parent[i as usize] as usize];
+            i = parent[i as usize];
+        }
+        i
+    }
+    for (t, sides) in neighbours.iter_ids() {
+        for (k, across) in sides.iter().enumerate() {
+            let Some((other, side)) = *across else {
+                continue;
+            };
+            // Neighbouring sides run in opposite directions.
+            for (mine, theirs) in [(k, (side + 1) % 3), ((k + 1) % 3, side)] {
+                let a = root(&mut parent, (t.index() * 3 + mine) as u32);
+                let b = root(&mut parent, (other.index() * 3 + theirs) as u32);
+                // The smaller number stays root, so the result does not depend on the order of joining.
+                parent[a.max(b) as usize] = a.min(b);
+            }
+        }
+    }
+    (0..parent.len() as u32)
+        .map(|i| root(&mut parent, i))
+        .collect()
+}
+
+/// Two equilateral triangles that do not overlap have centroids two inradii apart or more, L/√3: closer is overlap.
+/// On one lattice, where sheets lie, the converse holds too.
+fn check_overlap(triangles: &[[Point; 3]], edge_mm: f64) -> Result<(), PatternError> {
+    let least = edge_mm / 3f64.sqrt() * (1.0 - 1e-6);
+    let centroid =
+        |t: &[Point; 3]| ((t[0].to_vec2() + t[1].to_vec2() + t[2].to_vec2()) / 3.0).to_point();
+    let cell = |p: Point| {
+        (
+            (p.x / edge_mm).floor() as i64,
+            (p.y / edge_mm).floor() as i64,
+        )
+    };
+    let mut grid: BTreeMap<(i64, i64), Vec<u32>> = BTreeMap::new();
+    for (i, t) in triangles.iter().enumerate() {
+        let here = centroid(t);
+        let (x, y) = cell(here);
+        for near in (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| (x, y))) {
+            for &j in grid.get(&near).into_iter().flatten() {
+                if centroid(&triangles[j as usize]).distance(here) < least {
+                    return Err(PatternError::Overlap {
+                        first: TriangleId(j),
+                        second: TriangleId::from_index(i),
+                        x: here.x,
+                        y: here.y,
+                    });
+                }
+            }
+        }
+        grid.entry((x, y)).or_default().push(i as u32);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linkage::{Colour, Handedness};
+
+    fn hexagon(radius: i32, edge: f64) -> Linkage {
+        Linkage::patch(edge, Handedness::Right, &Linkage::hexagon_cells(radius))
+    }
+
+    #[test]
+    fn a_hexagon_has_the_counted_slits_area_and_rim() {
+        for radius in 1..5 {
+            let (edge, hinge, kerf) = (10.0, 0.8, 0.2);
+            let sheet = Sheet::new(&hexagon(radius, edge), hinge, kerf).unwrap();
+            let f = sheet.figures();
+            let (triangles, r) = (6 * radius * radius, f64::from(radius));
+            assert_eq!(f.triangles as i32, triangles);
+            assert_eq!(f.slits as i32, (3 * triangles - 6 * radius) / 2);
+            let slit = edge - (hinge + kerf) * 2.0 / 3f64.sqrt();
+            assert!((f.slit_length_mm - slit * f.slits as f64).abs() < 1e-9);
+            assert!(
+                (f.area_mm2 - f64::from(triangles) * 0.75f64.sqrt() / 2.0 * edge * edge).abs()
+                    < 1e-9
+            );
+            assert!((f.contour_length_mm - 6.0 * r * edge).abs() < 1e-9);
+            assert_eq!(sheet.contours.len(), 1);
+            assert_eq!(sheet.contours[0].points.len(), 6, "collinear sides are one");
+            assert!(sheet.contours[0].outer);
+            // Every inner vertex is a star of three.
+            let mut sizes = vec![0; f.stars];
+            for slit in &sheet.slits {
+                sizes[slit.star as usize] += 1;
+            }
+            let inner = 1 + 3 * radius * (radius - 1);
+            assert_eq!(sizes.iter().filter(|n| **n == 3).count() as i32, inner);
+        }
+    }
+
+    #[test]
+    fn the_narrowest_ligament_is_the_hinge_width_exactly() {
+        for (hinge, kerf) in [(0.5, 0.2), (1.0, 0.1), (1.7, 0.4)] {
+            for handedness in [Handedness::Right, Handedness::Left] {
+                let linkage = Linkage::patch(5.0, handedness, &Linkage::hexagon_cells(3));
+                let sheet = Sheet::new(&linkage, hinge, kerf).unwrap();
+                let mut narrowest = f64::INFINITY;
+                for (i, slit) in sheet.slits.iter().enumerate() {
+                    for other in sheet
+                        .slits
+                        .iter()
+                        .enumerate()
+                        .filter(|(j, o)| *j != i && o.star != slit.star)
+                    {
+                        let (a, b) = (other.1.tail, other.1.tip);
+                        let t = ((slit.tip - a).dot(b - a) / (b - a).hypot2()).clamp(0.0, 1.0);
+                        narrowest = narrowest.min(slit.tip.distance(a.lerp(b, t)) - kerf);
+                    }
+                }
+                assert!((narrowest - hinge).abs() < 1e-9, "{narrowest} for {hinge}");
+            }
+        }
+    }
+
+    #[test]
+    fn widths_that_leave_no_slit_are_refused_with_what_would_do() {
+        let error = Sheet::new(&hexagon(2, 2.0), 1.0, 0.2).unwrap_err();
+        let PatternError::TooWide {
+            least_edge_mm,
+            largest_hinge_mm,
+            ..
+        } = error
+        else {
+            panic!("{error}");
+        };
+        assert!(Sheet::new(&hexagon(2, least_edge_mm * 1.0001), 1.0, 0.2).is_ok());
+        assert!(Sheet::new(&hexagon(2, 2.0), largest_hinge_mm * 0.9999, 0.2).is_ok());
+        assert!(Sheet::new(&hexagon(2, 2.0), largest_hinge_mm * 1.0001, 0.2).is_err());
+        for (h, k) in [
+            (0.0, 0.1),
+            (f64::NAN, 0.1),
+            (1.0, -0.1),
+            (1.0, f64::INFINITY),
+        ] {
+            assert!(matches!(
+                Sheet::new(&hexagon(2, 9.0), h, k),
+                Err(PatternError::Width { .. })
+            ));
+        }
+        assert_eq!(
+            Sheet::new(&Linkage::patch(9.0, Handedness::Right, &[]), 1.0, 0.1),
+            Err(PatternError::Empty)
+        );
+    }
+
+    #[test]
+    fn a_layout_that_lies_on_itself_is_refused() {
+        let mut linkage = hexagon(2, 9.0);
+        linkage.triangles[TriangleId(5)].flat = linkage.triangles[TriangleId(0)].flat;
+        assert!(matches!(
+            Sheet::new(&linkage, 1.0, 0.1),
+            Err(PatternError::Overlap { .. })
+        ));
+    }
+
+    #[test]
+    fn the_ring_has_an_inner_contour_and_a_pinch_does_not_confuse_it() {
+        let mut cells = Linkage::hexagon_cells(2);
+        cells.retain(|&(i, j, c)| !Linkage::hexagon_cells(1).contains(&(i, j, c)));
+        let sheet = Sheet::new(&Linkage::patch(9.0, Handedness::Right, &cells), 1.0, 0.1).unwrap();
+        let outer: Vec<bool> = sheet.contours.iter().map(|c| c.outer).collect();
+        assert_eq!(outer.iter().filter(|o| **o).count(), 1);
+        assert_eq!(outer.len(), 2);
+        // Two holes that touch at a vertex, one triangle each.
+        let mut cells = Linkage::hexagon_cells(3);
+        cells.retain(|c| *c != (0, 0, Colour::Up) && *c != (-1, -1, Colour::Down));
+        let sheet = Sheet::new(&Linkage::patch(9.0, Handedness::Right, &cells), 1.0, 0.1).unwrap();
+        assert_eq!(sheet.contours.len(), 3);
+        for hole in sheet.contours.iter().filter(|c| !c.outer) {
+            assert_eq!(hole.points.len(), 3, "each hole is a loop of its own");
+        }
+        let whole = cells.len() as f64 * 0.75f64.sqrt() / 2.0 * 81.0;
+        assert!((sheet.figures().area_mm2 - whole).abs() < 1e-9);
+    }
+}

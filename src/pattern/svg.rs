@@ -1,0 +1,341 @@
+//! The drawing of a sheet, and reading it back.
+//!
+//! True to size in millimetres, one group and one colour an operation, Y flipped so that a viewer shows what the beam
+//! strikes. Numbers that are not geometry ride along as `data-kagome-*` attributes of the root.
+
+use kurbo::{BezPath, PathEl, Point, Rect};
+use svg::node::element::{Group, Path};
+
+use super::sheet::{Contour, Sheet, SheetMetadata, Slit, signed_area};
+use crate::base::units::{fixed, short};
+
+/// A tenth of a micrometre: a hundredth of what the verifier tolerates.
+const DECIMALS: usize = 4;
+
+/// The version of the attributes and groups.
+const FORMAT: &str = "1";
+
+/// Colours as laser programs sort operations by them.
+const CONTOUR: &str = "#ff0000";
+const SLITS: &str = "#0000ff";
+const GUIDE: &str = "#c0c0c0";
+
+/// The sheet as SVG text.
+pub fn svg(sheet: &Sheet) -> String {
+    // Rounded first, so that the page fits what is written and not what was meant.
+    let round = |v: f64| (v * 1e4).round() / 1e4;
+    let b = sheet.bounds();
+    let bounds = Rect::new(round(b.x0), round(b.y0), round(b.x1), round(b.y1));
+    // Room for half the cut and a stroke.
+    let room = 1.0f64.max(2.0 * sheet.metadata.kerf_mm);
+    let view = bounds.inflate(room, room);
+    let (width, height) = (
+        short(view.width(), DECIMALS),
+        short(view.height(), DECIMALS),
+    );
+    let group = |id: &str, colour: &str, stroke: &str| {
+        Group::new()
+            .set("id", id)
+            .set("fill", "none")
+            .set("stroke", colour)
+            .set("stroke-width", stroke)
+    };
+    let mut guide = group("guide", GUIDE, "0.05");
+    for triangle in &sheet.triangles {
+        guide = guide.add(Path::new().set("d", closed(triangle)));
+    }
+    let mut slits = group("slits", SLITS, "0.1");
+    for slit in &sheet.slits {
+        let mut path = BezPath::new();
+        path.move_to(slit.tail);
+        path.line_to(slit.tip);
+        slits = slits.add(
+            Path::new()
+                .set("d", data(&path))
+                .set("data-star", slit.star.to_string()),
+        );
+    }
+    let mut contour = group("contour", CONTOUR, "0.1");
+    for c in &sheet.contours {
+        let class = if c.outer { "outer" } else { "inner" };
+        contour = contour.add(Path::new().set("class", class).set("d", closed(&c.points)));
+    }
+    let m = &sheet.metadata;
+    let document = svg::Document::new()
+        .set("width", format!("{width}mm"))
+        .set("height", format!("{height}mm"))
+        .set(
+            "viewBox",
+            format!(
+                "{} {} {width} {height}",
+                fixed(view.x0, DECIMALS),
+                fixed(-view.y1, DECIMALS)
+            ),
+        )
+        .set("data-kagome-format", FORMAT)
+        .set("data-kagome-edge-mm", exact(m.edge_mm))
+        .set("data-kagome-hinge-width-mm", exact(m.hinge_width_mm))
+        .set("data-kagome-kerf-mm", exact(m.kerf_mm))
+        .add(guide)
+        .add(slits)
+        .add(contour);
+    format!("{document}\n")
+}
+
+/// The shortest decimals that give the same number back.
+fn exact(value: f64) -> String {
+    format!("{value}")
+}
+
+fn closed(points: &[Point]) -> String {
+    let mut path = BezPath::new();
+    for (i, p) in points.iter().enumerate() {
+        if i == 0 {
+            path.move_to(*p);
+        } else {
+            path.line_to(*p);
+        }
+    }
+    path.close_path();
+    data(&path)
+}
+
+/// Path data with fixed decimals: kurbo's own writer has no precision, and the svg crate's rounds to f32.
+fn data(path: &BezPath) -> String {
+    let at = |p: Point| format!("{},{}", fixed(p.x, DECIMALS), fixed(-p.y, DECIMALS));
+    let parts: Vec<String> = path
+        .elements()
+        .iter()
+        .map(|element| match *element {
+            PathEl::MoveTo(p) => format!("M{}", at(p)),
+            PathEl::LineTo(p) => format!("L{}", at(p)),
+            PathEl::QuadTo(a, p) => format!("Q{} {}", at(a), at(p)),
+            PathEl::CurveTo(a, b, p) => format!("C{} {} {}", at(a), at(b), at(p)),
+            PathEl::ClosePath => "Z".into(),
+        })
+        .collect();
+    parts.join(" ")
+}
+
+/// Why an SVG is not read as a sheet.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SvgError {
+    /// Not XML.
+    #[error("this is not an SVG: {0}")]
+    NotXml(String),
+    /// XML of another kind, or without our attributes.
+    #[error("{0}. Only an SVG that kagome wrote (its `pattern.svg`) can be read as a sheet")]
+    NotOurs(String),
+    /// A number is missing or wrong.
+    #[error("the SVG's attribute {attribute} {problem}")]
+    Attribute {
+        /// Its name.
+        attribute: &'static str,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// An element that cannot be cut as it is.
+    #[error("line {line} of the SVG: {problem}")]
+    Element {
+        /// Line, counted from 1.
+        line: u32,
+        /// What is wrong, and what to do.
+        problem: String,
+    },
+}
+
+/// Reads an SVG that [`svg`] wrote.
+///
+/// # Errors
+/// [`SvgError`] with the line: not ours, a transform, a path that is not straight, a slit that is not one line.
+pub fn read_svg(text: &str) -> Result<Sheet, SvgError> {
+    let document = roxmltree::Document::parse(text).map_err(|e| SvgError::NotXml(e.to_string()))?;
+    let root = document.root_element();
+    if root.tag_name().name() != "svg" {
+        let name = root.tag_name().name();
+        return Err(SvgError::NotOurs(format!(
+            "the file's root is <{name}>, not <svg>"
+        )));
+    }
+    match root.attribute("data-kagome-format") {
+        Some(FORMAT) => {}
+        Some(other) => {
+            return Err(SvgError::Attribute {
+                attribute: "data-kagome-format",
+                problem: format!("is {other:?}, and this build reads {FORMAT:?}"),
+            });
+        }
+        None => {
+            return Err(SvgError::NotOurs(
+                "the root has no data-kagome-format".into(),
+            ));
+        }
+    }
+    let metadata = SheetMetadata {
+        edge_mm: positive(root, "data-kagome-edge-mm")?,
+        hinge_width_mm: positive(root, "data-kagome-hinge-width-mm")?,
+        kerf_mm: positive(root, "data-kagome-kerf-mm")?,
+    };
+    let mut sheet = Sheet {
+        slits: Vec::new(),
+        contours: Vec::new(),
+        triangles: Vec::new(),
+        metadata,
+    };
+    for node in root.descendants().filter(roxmltree::Node::is_element) {
+        let line = document.text_pos_at(node.range().start).row;
+        let wrong = |problem: String| SvgError::Element { line, problem };
+        if node.has_attribute("transform") {
+            return Err(wrong(
+                "a transform moves this part; apply it in the drawing program first".into(),
+            ));
+        }
+        let group = node.ancestors().skip(1).find_map(|a| a.attribute("id"));
+        match (node.tag_name().name(), group) {
+            ("svg" | "g", _) => {}
+            ("path", Some(group @ ("guide" | "slits" | "contour"))) => {
+                let d = node.attribute("d").unwrap_or("");
+                let (points, is_closed) = polyline(d).map_err(wrong)?;
+                match (group, is_closed, points.len()) {
+                    ("guide", true, 3) => sheet.triangles.push([points[0], points[1], points[2]]),
+                    ("slits", false, 2) => sheet.slits.push(Slit {
+                        tail: points[0],
+                        tip: points[1],
+                        star: node
+                            .attribute("data-star")
+                            .and_then(|s| s.parse().ok())
+                            .ok_or_else(|| wrong("a slit without a number in data-star".into()))?,
+                    }),
+                    ("contour", true, 3..) => sheet.contours.push(Contour {
+                        outer: signed_area(&points) > 0.0,
+                        points,
+                    }),
+                    _ => {
+                        return Err(wrong(format!(
+                            "a path of {} points, {}, does not belong into the group `{group}`",
+                            points.len(),
+                            if is_closed { "closed" } else { "open" }
+                        )));
+                    }
+                }
+            }
+            (name, _) => return Err(wrong(format!("<{name}> is nothing that a sheet has"))),
+        }
+    }
+    Ok(sheet)
+}
+
+fn positive(root: roxmltree::Node<'_, '_>, attribute: &'static str) -> Result<f64, SvgError> {
+    let wrong = |problem: String| SvgError::Attribute { attribute, problem };
+    let text = root
+        .attribute(attribute)
+        .ok_or_else(|| wrong("is missing".into()))?;
+    match text.parse::<f64>() {
+        Ok(v) if v.is_finite() && v > 0.0 => Ok(v),
+        _ => Err(wrong(format!("is {text:?}, not a length above 0"))),
+    }
+}
+
+/// The points of straight path data, in the sheet's frame, and whether it is closed.
+fn polyline(d: &str) -> Result<(Vec<Point>, bool), String> {
+    let path = BezPath::from_svg(d).map_err(|e| format!("path data {d:?}: {e}"))?;
+    let mut points = Vec::new();
+    let mut is_closed = false;
+    for (i, element) in path.elements().iter().enumerate() {
+        match *element {
+            PathEl::MoveTo(p) if i == 0 => points.push(p),
+            PathEl::LineTo(p) if !is_closed => points.push(p),
+            PathEl::ClosePath if !is_closed => is_closed = true,
+            PathEl::MoveTo(_) => return Err("one path holds several; split it".into()),
+            _ => return Err("a curve; a sheet has straight lines only".into()),
+        }
+    }
+    if points.iter().any(|p| !p.is_finite()) {
+        return Err(format!(
+            "path data {d:?} has a coordinate that is not a number"
+        ));
+    }
+    Ok((
+        points.into_iter().map(|p| Point::new(p.x, -p.y)).collect(),
+        is_closed,
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linkage::{Handedness, Linkage};
+
+    fn sheet() -> Sheet {
+        let mut cells = Linkage::hexagon_cells(3);
+        cells.retain(|c| !Linkage::hexagon_cells(1).contains(c));
+        Sheet::new(
+            &Linkage::patch(10.0 / 3.0, Handedness::Left, &cells),
+            0.7,
+            0.15,
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_to_the_last_decimal_and_written_the_same_again() {
+        let (one, text) = (sheet(), svg(&sheet()));
+        let two = read_svg(&text).unwrap();
+        assert_eq!(two.metadata, one.metadata);
+        let close = |a: Point, b: Point| a.distance(b) < 1e-4;
+        assert_eq!(one.slits.len(), two.slits.len());
+        for (a, b) in one.slits.iter().zip(&two.slits) {
+            assert!(close(a.tail, b.tail) && close(a.tip, b.tip) && a.star == b.star);
+        }
+        assert_eq!(one.contours.len(), 2);
+        for (a, b) in one.contours.iter().zip(&two.contours) {
+            assert_eq!(a.outer, b.outer);
+            assert!(a.points.iter().zip(&b.points).all(|(p, q)| close(*p, *q)));
+        }
+        assert_eq!(svg(&two), text);
+        assert!(!text.contains("-0.0000"));
+    }
+
+    #[test]
+    fn the_page_is_true_to_size() {
+        let text = svg(&sheet());
+        let document = roxmltree::Document::parse(&text).unwrap();
+        let root = document.root_element();
+        let view: Vec<f64> = root
+            .attribute("viewBox")
+            .unwrap()
+            .split(' ')
+            .map(|v| v.parse().unwrap())
+            .collect();
+        assert_eq!(
+            root.attribute("width").unwrap(),
+            format!("{}mm", short(view[2], 4))
+        );
+        assert!((view[2] - (sheet().bounds().width() + 2.0)).abs() < 1e-3);
+        let groups: Vec<_> = root.children().filter_map(|n| n.attribute("id")).collect();
+        assert_eq!(groups, ["guide", "slits", "contour"]);
+    }
+
+    #[test]
+    fn a_drawing_that_is_no_sheet_is_refused_with_the_line() {
+        let good = svg(&sheet());
+        for (from, to, word) in [
+            ("<svg", "<html", "not an SVG"),
+            ("data-kagome-format=\"1\"", "", "data-kagome-format"),
+            (
+                "data-kagome-kerf-mm=\"0.15\"",
+                "data-kagome-kerf-mm=\"nan\"",
+                "kerf",
+            ),
+            ("<path", "<path transform=\"scale(2)\"", "transform"),
+            ("<path", "<text", "<text>"),
+            ("L", "Q1,1 ", "line 3"),
+        ] {
+            let bad = good.replacen(from, to, 1);
+            assert_ne!(bad, good, "the fixture changed: {from}");
+            let text = read_svg(&bad).unwrap_err().to_string();
+            assert!(text.contains(word), "{text}");
+        }
+        assert!(read_svg("<svg/>").is_err() && read_svg("").is_err() && read_svg("<a/>").is_err());
+    }
+}
