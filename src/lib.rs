@@ -3,6 +3,7 @@
 pub mod base;
 pub mod cli;
 pub mod conformal;
+pub mod gcode;
 pub mod linkage;
 pub mod machine;
 pub mod material;

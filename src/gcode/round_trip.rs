@@ -1,0 +1,203 @@
+//! Sheet → toolpath → G-code → verdict, over random linkages; and every kind of damage is found.
+
+use std::collections::BTreeSet;
+
+use proptest::prelude::*;
+
+use super::{Finding, Rule, read, verify, write};
+use crate::base::ids::Id;
+use crate::linkage::{Handedness, Linkage, TriangleId};
+use crate::machine::{self, Machine};
+use crate::material;
+use crate::pattern::{Sheet, placed, read_svg, svg};
+use crate::toolpath::plan;
+
+/// The largest edge-connected part of a hexagon of cells without those of `removed`.
+fn patch(handedness: Handedness, removed: &BTreeSet<usize>) -> Linkage {
+    let mut cells = Linkage::hexagon_cells(3);
+    let mut index = 0;
+    cells.retain(|_| {
+        index += 1;
+        !removed.contains(&(index - 1))
+    });
+    let all = Linkage::patch(12.0, handedness, &cells);
+    let neighbours = all.neighbours();
+    let mut part = vec![usize::MAX; cells.len()];
+    let mut sizes = Vec::new();
+    for first in 0..cells.len() {
+        if part[first] != usize::MAX {
+            continue;
+        }
+        let mut stack = vec![first];
+        part[first] = sizes.len();
+        let mut size = 0;
+        while let Some(t) = stack.pop() {
+            size += 1;
+            for (other, _) in neighbours[TriangleId::from_index(t)].iter().flatten() {
+                if part[other.index()] == usize::MAX {
+                    part[other.index()] = sizes.len();
+                    stack.push(other.index());
+                }
+            }
+        }
+        sizes.push(size);
+    }
+    let largest = (0..sizes.len()).max_by_key(|p| sizes[*p]).unwrap();
+    let kept: Vec<_> = (0..cells.len())
+        .filter(|c| part[*c] == largest)
+        .map(|c| cells[c])
+        .collect();
+    Linkage::patch(12.0, handedness, &kept)
+}
+
+fn job(linkage: &Linkage, passes: u32, mirror: bool) -> (Sheet, String, Machine) {
+    let machine = machine::load(machine::DEFAULT).unwrap();
+    let material = material::load(material::DEFAULT).unwrap();
+    let mut setting = material.cut_for(&machine).unwrap();
+    setting.passes = passes;
+    let sheet = Sheet::new(linkage, material.hinge_width_mm, setting.kerf_mm).unwrap();
+    let (sheet, _) = placed(&sheet, &machine, mirror).unwrap();
+    // What the verifier gets is the drawing, not our memory of it.
+    let sheet = read_svg(&svg(&sheet)).unwrap();
+    let toolpath = plan(&sheet, &setting, [0.0, 0.0]).unwrap();
+    let text = write(&toolpath, &machine, &material).unwrap();
+    (sheet, text, machine)
+}
+
+fn removed() -> impl Strategy<Value = BTreeSet<usize>> {
+    proptest::collection::btree_set(0usize..54, 0..20)
+}
+
+fn findings(text: &str, machine: &Machine, sheet: &Sheet, passes: u32) -> Vec<Finding> {
+    verify(text, machine, Some(sheet), Some(passes))
+        .unwrap()
+        .findings
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 32, ..ProptestConfig::default() })]
+
+    #[test]
+    fn what_we_write_is_what_the_sheet_wants(removed in removed(), left: bool, mirror: bool, passes in 1u32..4) {
+        let handedness = if left { Handedness::Left } else { Handedness::Right };
+        let (sheet, text, machine) = job(&patch(handedness, &removed), passes, mirror);
+        let verdict = verify(&text, &machine, Some(&sheet), None).unwrap();
+        prop_assert_eq!(&verdict.findings, &[]);
+        prop_assert_eq!(verdict.passes, Some(passes));
+        prop_assert!(findings(&text, &machine, &sheet, passes + 1).iter().any(|f| f.rule == Rule::Missing));
+    }
+
+    #[test]
+    fn damage_is_found(removed in removed(), at in any::<prop::sample::Index>(), kind in 0..7, passes in 1u32..3) {
+        let (sheet, text, machine) = job(&patch(Handedness::Right, &removed), passes, false);
+        prop_assert_eq!(findings(&text, &machine, &sheet, passes), vec![]);
+        let mut lines: Vec<String> = text.lines().map(String::from).collect();
+        // Motion lines of the slits: there every corner is sharp, so that every line counts.
+        let first = lines.iter().position(|l| l.starts_with("; slits")).unwrap();
+        let last = lines.iter().position(|l| l.starts_with("; holes") || l.starts_with("; rim")).unwrap();
+        let motions: Vec<usize> = (first + 1..last).collect();
+        let rapids: Vec<usize> = motions.iter().copied().filter(|l| lines[*l].starts_with("G0")).collect();
+        let strokes: Vec<_> = read(&text).moves.into_iter().filter(|m| m.burns() && m.line <= last).collect();
+        let line = motions[at.index(motions.len())];
+        let rapid = rapids[at.index(rapids.len())];
+        match kind {
+            0 => { lines.remove(line); }
+            1 => {
+                let words: Vec<String> = lines[line].split(' ').map(|w| match w.split_at(1) {
+                    ("X", v) => format!("X{:.3}", v.parse::<f64>().unwrap() + 0.05),
+                    ("Y", v) => format!("Y{:.3}", v.parse::<f64>().unwrap() - 0.05),
+                    _ => w.into(),
+                }).collect();
+                lines[line] = words.join(" ");
+            }
+            2 => lines[rapid] = lines[rapid].replacen("G0", "G1", 1),
+            3 => {
+                let m = &strokes[at.index(strokes.len())];
+                let from = m.from.unwrap();
+                let again = format!("X{:.3} Y{:.3}\nX{:.3} Y{:.3}", from.x, from.y, m.to.x, m.to.y);
+                lines.insert(m.line, again);
+            }
+            4 => {
+                let m = &strokes[at.index(strokes.len())];
+                lines.insert(m.line, format!("X{:.3} Y{:.3}", m.to.x + 1.3, m.to.y + 0.4));
+            }
+            5 => lines[rapid].push_str(" S500"),
+            _ => { lines.swap(line, if line + 1 < last { line + 1 } else { line - 1 }); }
+        }
+        let damaged = lines.join("\n");
+        if damaged != text.trim_end() {
+            prop_assert!(!findings(&damaged, &machine, &sheet, passes).is_empty(), "{}", damaged);
+        }
+    }
+}
+
+#[test]
+fn damage_to_the_frame_of_the_job_is_found_by_its_rule() {
+    let (sheet, text, machine) = job(&patch(Handedness::Right, &BTreeSet::new()), 1, false);
+    for (from, to, rule) in [
+        ("G21\n", "", Rule::Modes),
+        ("G90\n", "", Rule::Modes),
+        ("G21\n", "G20\n", Rule::OffBed),
+        ("G90\n", "G91\n", Rule::Missing),
+        ("M4 S0", "M3 S0", Rule::ConstantPower),
+        ("M4 S0\n", "", Rule::Missing),
+        ("M5\n", "", Rule::BeamAtEnd),
+        ("F900", "F0", Rule::Feed),
+        (" F900", "", Rule::Feed),
+        ("F900", "F90000", Rule::Feed),
+        ("S300", "S1001", Rule::Power),
+        (
+            "; slits",
+            "; slits ................................................................................",
+            Rule::LineTooLong,
+        ),
+        ("; slits", "; slits?", Rule::Syntax),
+        ("M5\n", "X700\nM5\n", Rule::OffBed),
+        ("M5\n", "G2 X1 Y1\nM5\n", Rule::Syntax),
+        ("G0 X", "X", Rule::Modes),
+    ] {
+        let damaged = text.replacen(from, to, 1);
+        assert_ne!(damaged, text, "the fixture changed: {from}");
+        let rules: Vec<Rule> = findings(&damaged, &machine, &sheet, 1)
+            .iter()
+            .map(|f| f.rule)
+            .collect();
+        assert!(rules.contains(&rule), "{from:?} → {to:?}: {rules:?}");
+    }
+}
+
+#[test]
+fn a_cut_is_rounded_by_less_than_a_micrometre_and_a_hundredth_is_too_much() {
+    let (sheet, text, machine) = job(&patch(Handedness::Right, &BTreeSet::new()), 1, false);
+    let moved = |by: f64| {
+        let mut sheet = sheet.clone();
+        for slit in &mut sheet.slits {
+            slit.tail.x += by;
+            slit.tip.x += by;
+        }
+        sheet
+    };
+    assert_eq!(findings(&text, &machine, &moved(0.009), 1), []);
+    assert!(!findings(&text, &machine, &moved(0.012), 1).is_empty());
+}
+
+#[test]
+fn no_line_is_longer_than_needed_and_modal_words_are_said_once() {
+    let (_, text, _) = job(&patch(Handedness::Left, &BTreeSet::new()), 1, false);
+    assert_eq!(text.matches('F').count(), 1);
+    assert_eq!(
+        text.lines()
+            .filter(|l| l.contains(" S") && l.starts_with('G'))
+            .count(),
+        1
+    );
+    assert!(text.lines().all(|l| l.len() < 60));
+    let motion: Vec<&str> = text
+        .lines()
+        .filter(|l| l.starts_with("G1") || l.starts_with("G0"))
+        .collect();
+    assert!(
+        motion.windows(2).all(|w| w[0][..2] != w[1][..2]),
+        "G0 and G1 only where they change"
+    );
+}

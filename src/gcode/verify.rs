@@ -1,0 +1,418 @@
+//! The verdict on a job: what it burns is what the sheet wants, and nothing else.
+
+use std::fmt;
+
+use kurbo::Point;
+
+use super::coverage::{Index, Pieces, Segment};
+use super::interpret::{Beam, Program, read};
+use crate::base::units::short;
+use crate::machine::{Machine, PowerMode};
+use crate::pattern::Sheet;
+use crate::toolpath::{ToolpathError, outline};
+
+/// How far a burnt line may be from a wanted one and still be it, millimetres. Rounding to three decimals takes 0.0007.
+pub const TOLERANCE_MM: f64 = 0.01;
+
+/// Gaps below this are rounding, millimetres.
+const NO_GAP_MM: f64 = 1e-6;
+
+/// Where two strokes meet at an angle, a short piece lies within the tolerance of both: up to 2τ at 30° and more.
+const JOINT_MM: f64 = 2.0 * TOLERANCE_MM;
+
+/// Rounding of coordinates may go over the bed's edge by this much, millimetres.
+const EDGE_MM: f64 = 0.001;
+
+/// What a job must do or not do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rule {
+    /// The controller would refuse the line, or nobody can say what it does.
+    Syntax,
+    /// No line longer than the controller's limit.
+    LineTooLong,
+    /// Unit, distance mode and position are known before the first motion.
+    Modes,
+    /// The head stays on the bed.
+    OffBed,
+    /// No rapid arms the beam.
+    BurnOnRapid,
+    /// The beam is never on at rest.
+    StandingBeam,
+    /// M3 only where the machine's profile accepts it.
+    ConstantPower,
+    /// Every burning move has a feed above 0 and within the machine's rates.
+    Feed,
+    /// Power within the machine's scale.
+    Power,
+    /// The beam is switched off before the end.
+    BeamAtEnd,
+    /// Every wanted cut is made, as often as wanted.
+    Missing,
+    /// No wanted cut is made more often.
+    Repeated,
+    /// Nothing else is burnt.
+    Stray,
+}
+
+/// One thing that is wrong.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Finding {
+    /// Line of the G-code, counted from 1, where one can be named.
+    pub line: Option<usize>,
+    /// The rule that is broken.
+    pub rule: Rule,
+    /// What, where, in words.
+    pub text: String,
+}
+
+impl Finding {
+    pub(super) fn at(line: usize, rule: Rule, text: String) -> Self {
+        Self {
+            line: Some(line),
+            rule,
+            text,
+        }
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.line {
+            Some(line) => write!(f, "line {line}: {}", self.text),
+            None => f.write_str(&self.text),
+        }
+    }
+}
+
+/// The outcome of [`verify`].
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Verdict {
+    /// Everything that is wrong, by line; empty means the job is good.
+    pub findings: Vec<Finding>,
+    /// Length burnt, millimetres.
+    pub burnt_mm: f64,
+    /// Length of rapids, millimetres.
+    pub travel_mm: f64,
+    /// How often each cut is gone over, as given or as found; `None` without a sheet.
+    pub passes: Option<u32>,
+    /// Whether the burnt lines were compared with a sheet.
+    pub compared: bool,
+}
+
+impl Verdict {
+    /// Whether nothing is wrong.
+    pub fn passed(&self) -> bool {
+        self.findings.is_empty()
+    }
+}
+
+/// Judges a job for a machine and, if there is one, against the sheet that it must cut.
+///
+/// `passes`: how often each cut must be gone over; `None` takes the number from the total length burnt, and then demands
+/// it everywhere.
+///
+/// # Tolerance
+/// A burnt line is a wanted one within [`TOLERANCE_MM`]. Coverage is exact, by intervals and not by samples; the time
+/// grows with the number of segments times its logarithm.
+///
+/// # Errors
+/// [`ToolpathError`] if the sheet itself cannot be cut with its kerf.
+pub fn verify(
+    text: &str,
+    machine: &Machine,
+    sheet: Option<&Sheet>,
+    passes: Option<u32>,
+) -> Result<Verdict, ToolpathError> {
+    let program = read(text);
+    let mut findings = program.findings.clone();
+    check_lines(text, machine, &mut findings);
+    check_moves(&program, machine, &mut findings);
+    let length = |rapid: bool| -> f64 {
+        program
+            .moves
+            .iter()
+            .filter(|m| if rapid { m.rapid } else { m.burns() })
+            .filter_map(|m| m.from.map(|f| f.distance(m.to)))
+            .sum()
+    };
+    let burnt_mm = length(false);
+    let mut found_passes = None;
+    if let Some(sheet) = sheet {
+        let wanted = Wanted::new(sheet)?;
+        let once = wanted.length_mm();
+        let n = passes.unwrap_or_else(|| (burnt_mm / once).round().clamp(1.0, 1000.0) as u32);
+        found_passes = Some(n);
+        compare(&program, &wanted, n, &mut findings);
+    }
+    findings.sort_by_key(|f| f.line.unwrap_or(usize::MAX));
+    Ok(Verdict {
+        findings,
+        burnt_mm,
+        travel_mm: length(true),
+        passes: found_passes,
+        compared: sheet.is_some(),
+    })
+}
+
+fn check_lines(text: &str, machine: &Machine, findings: &mut Vec<Finding>) {
+    let limit = machine.controller.line_limit();
+    for (i, line) in text.lines().enumerate() {
+        if line.len() > limit {
+            findings.push(Finding::at(
+                i + 1,
+                Rule::LineTooLong,
+                format!(
+                    "the line has {} characters, and the controller takes {limit}",
+                    line.len()
+                ),
+            ));
+        }
+        // These act at once, wherever they stand: feed hold, resume, status, reset.
+        if let Some(c) = line.chars().find(|c| "!~?\u{18}".contains(*c)) {
+            findings.push(Finding::at(
+                i + 1,
+                Rule::Syntax,
+                format!("the character {c:?} is a real-time command, also in a comment"),
+            ));
+        }
+    }
+}
+
+fn check_moves(program: &Program, machine: &Machine, findings: &mut Vec<Finding>) {
+    let reach = machine.reach();
+    let fastest = machine
+        .motion
+        .rate_mm_per_min
+        .x
+        .max(machine.motion.rate_mm_per_min.y);
+    // One finding a line and rule: chords of an arc would repeat it.
+    let mut last: Option<(usize, Rule)> = None;
+    let mut say = |line: usize, rule: Rule, text: String| {
+        if last != Some((line, rule)) {
+            findings.push(Finding::at(line, rule, text));
+            last = Some((line, rule));
+        }
+    };
+    for m in &program.moves {
+        if !reach.contains([m.to.x, m.to.y], EDGE_MM) {
+            say(
+                m.line,
+                Rule::OffBed,
+                format!(
+                    "the head goes to {}, off the bed (x {} to {}, y {} to {} mm)",
+                    place(m.to),
+                    short(reach.min[0], 3),
+                    short(reach.max[0], 3),
+                    short(reach.min[1], 3),
+                    short(reach.max[1], 3)
+                ),
+            );
+        }
+        if !m.rapid && m.feed_mm_per_min <= 0.0 {
+            say(m.line, Rule::Feed, "a cut without a feed (F)".into());
+        }
+        if !m.burns() {
+            continue;
+        }
+        if m.from.is_none() {
+            say(
+                m.line,
+                Rule::Modes,
+                "the beam burns from a place that nobody named".into(),
+            );
+        }
+        if m.beam == Beam::Constant && machine.laser.power_mode == PowerMode::Dynamic {
+            say(
+                m.line,
+                Rule::ConstantPower,
+                "M3 keeps the beam on if the link is lost; this machine's profile allows M4 only"
+                    .into(),
+            );
+        }
+        if m.feed_mm_per_min > fastest {
+            say(
+                m.line,
+                Rule::Feed,
+                format!(
+                    "the feed is {} mm/min, and the machine moves at {} at the most",
+                    short(m.feed_mm_per_min, 3),
+                    short(fastest, 3)
+                ),
+            );
+        }
+        if m.power > machine.laser.s_max {
+            say(
+                m.line,
+                Rule::Power,
+                format!(
+                    "S{} is above the machine's full power, S{}",
+                    short(m.power, 3),
+                    short(machine.laser.s_max, 3)
+                ),
+            );
+        }
+    }
+}
+
+/// What a sheet wants burnt.
+struct Wanted {
+    segments: Vec<Segment>,
+    /// For each cut its name and its segments.
+    cuts: Vec<(&'static str, std::ops::Range<usize>)>,
+}
+
+impl Wanted {
+    fn new(sheet: &Sheet) -> Result<Self, ToolpathError> {
+        let mut wanted = Self {
+            segments: Vec::with_capacity(sheet.slits.len()),
+            cuts: Vec::with_capacity(sheet.slits.len()),
+        };
+        for slit in &sheet.slits {
+            let at = wanted.segments.len();
+            wanted.segments.push(Segment {
+                a: slit.tail,
+                b: slit.tip,
+            });
+            wanted.cuts.push(("the slit", at..at + 1));
+        }
+        for contour in &sheet.contours {
+            let at = wanted.segments.len();
+            let line = outline(contour, sheet.metadata.kerf_mm)?;
+            for i in 0..line.len() {
+                wanted.segments.push(Segment {
+                    a: line[i],
+                    b: line[(i + 1) % line.len()],
+                });
+            }
+            let name = if contour.outer { "the rim" } else { "the hole" };
+            wanted.cuts.push((name, at..wanted.segments.len()));
+        }
+        Ok(wanted)
+    }
+
+    fn length_mm(&self) -> f64 {
+        self.segments.iter().map(Segment::length).sum()
+    }
+}
+
+fn compare(program: &Program, wanted: &Wanted, passes: u32, findings: &mut Vec<Finding>) {
+    let mut lines = Vec::new();
+    let mut burnt = Vec::new();
+    for m in program.moves.iter().filter(|m| m.burns()) {
+        lines.push(m.line);
+        burnt.push(Segment {
+            a: m.from.unwrap_or(m.to),
+            b: m.to,
+        });
+    }
+    let passes = passes as i32;
+    let burnt_index = Index::new(burnt.clone());
+    let mut pieces = Pieces::default();
+    for (name, range) in &wanted.cuts {
+        // Per cut: total length and worst count of what is missing and repeated, and the first place of each.
+        let mut missing: Option<(f64, i32, Point)> = None;
+        let mut repeated: Option<(f64, i32, Point)> = None;
+        for segment in &wanted.segments[range.clone()] {
+            burnt_index.along(segment, TOLERANCE_MM, &mut pieces);
+            let length = segment.length();
+            let note = |slot: &mut Option<(f64, i32, Point)>, run: (f64, f64), count: i32| {
+                let entry = slot.get_or_insert((0.0, count, segment.at(0.5 * (run.0 + run.1))));
+                entry.0 += run.1 - run.0;
+            };
+            pieces.runs(
+                true,
+                length,
+                NO_GAP_MM,
+                |n| n < passes,
+                |run, n| note(&mut missing, run, n),
+            );
+            pieces.runs(
+                false,
+                length,
+                JOINT_MM,
+                |n| n > passes,
+                |run, n| note(&mut repeated, run, n),
+            );
+        }
+        let whole: f64 = wanted.segments[range.clone()]
+            .iter()
+            .map(Segment::length)
+            .sum();
+        let ends = (
+            wanted.segments[range.start].a,
+            wanted.segments[range.end - 1].b,
+        );
+        let describe = |found: (f64, i32, Point)| {
+            format!(
+                "{name} from {} to {} is cut {} over {} of its {} mm, near {}",
+                place(ends.0),
+                place(ends.1),
+                times(found.1),
+                short(found.0, 3),
+                short(whole, 3),
+                place(found.2)
+            )
+        };
+        if let Some(found) = missing {
+            findings.push(Finding {
+                line: None,
+                rule: Rule::Missing,
+                text: format!("{} instead of {}", describe(found), times(passes)),
+            });
+        }
+        if let Some(found) = repeated {
+            findings.push(Finding {
+                line: None,
+                rule: Rule::Repeated,
+                text: format!("{} instead of {}", describe(found), times(passes)),
+            });
+        }
+    }
+    let wanted_index = Index::new(wanted.segments.clone());
+    for (segment, line) in burnt.iter().zip(lines) {
+        wanted_index.along(segment, TOLERANCE_MM, &mut pieces);
+        let length = segment.length();
+        let mut stray: Option<(f64, Point)> = None;
+        if length <= NO_GAP_MM {
+            if pieces.capped.is_empty() {
+                stray = Some((0.0, segment.a));
+            }
+        } else {
+            pieces.runs(
+                true,
+                length,
+                NO_GAP_MM,
+                |n| n < 1,
+                |run, _| {
+                    let middle = segment.at(0.5 * (run.0 + run.1));
+                    stray.get_or_insert((0.0, middle)).0 += run.1 - run.0;
+                },
+            );
+        }
+        if let Some((length, at)) = stray {
+            findings.push(Finding::at(
+                line,
+                Rule::Stray,
+                format!(
+                    "{} mm are burnt where the sheet has no cut, near {}",
+                    short(length, 3),
+                    place(at)
+                ),
+            ));
+        }
+    }
+}
+
+fn times(n: i32) -> String {
+    match n {
+        0 => "not at all".into(),
+        1 => "once".into(),
+        2 => "twice".into(),
+        n => format!("{n} times"),
+    }
+}
+
+fn place(p: Point) -> String {
+    format!("({}, {})", short(p.x, 3), short(p.y, 3))
+}

@@ -1,0 +1,166 @@
+//! G-code for a GRBL laser.
+
+use kurbo::Point;
+
+use crate::base::units::short;
+use crate::machine::{Machine, PowerMode};
+use crate::material::Material;
+use crate::toolpath::{Role, Toolpath};
+
+/// Micrometres: GRBL prints and keeps no more, and the verifier tolerates ten.
+const DECIMALS: usize = 3;
+
+/// Why a toolpath cannot be written for a machine.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GcodeError {
+    /// A line would be longer than the controller takes. Only coordinates of astronomical size can do that.
+    #[error("the line {line:?} has {length} characters, and the controller takes {limit}")]
+    LineTooLong {
+        /// The line.
+        line: String,
+        /// Its length.
+        length: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// A coordinate is not a number.
+    #[error("a cut has a coordinate that is not a number, near ({x}, {y})")]
+    NotFinite {
+        /// The x coordinate.
+        x: f64,
+        /// The y coordinate.
+        y: f64,
+    },
+}
+
+/// Lines under construction, and what the controller already knows.
+struct Writer {
+    lines: Vec<String>,
+    at: Option<[String; 2]>,
+    motion: &'static str,
+    feed: String,
+    power: String,
+}
+
+impl Writer {
+    fn line(&mut self, text: impl Into<String>) {
+        self.lines.push(text.into());
+    }
+
+    /// Says only what changes. A move to where the head is anyway is left out: controllers drop it too, some with the
+    /// beam on.
+    fn go(&mut self, motion: &'static str, to: Point, settings: Option<(&str, &str)>) {
+        let target = [short(to.x, DECIMALS), short(to.y, DECIMALS)];
+        let mut words: Vec<String> = Vec::with_capacity(5);
+        for (axis, letter) in ["X", "Y"].iter().enumerate() {
+            if self.at.as_ref().is_none_or(|at| at[axis] != target[axis]) {
+                words.push(format!("{letter}{}", target[axis]));
+            }
+        }
+        if words.is_empty() {
+            return;
+        }
+        if self.motion != motion {
+            words.insert(0, motion.into());
+            self.motion = motion;
+        }
+        if let Some((feed, power)) = settings {
+            if self.feed != feed {
+                words.push(format!("F{feed}"));
+                self.feed = feed.into();
+            }
+            if self.power != power {
+                words.push(format!("S{power}"));
+                self.power = power.into();
+            }
+        }
+        self.at = Some(target);
+        self.line(words.join(" "));
+    }
+}
+
+/// The G-code of a toolpath, in machine coordinates, ending with a line end.
+///
+/// The beam: `M4` follows speed and is off on every `G0` and at rest, as long as the controller is in laser mode
+/// (`$32=1`). Power stays set between cuts: an S word on a rapid would stop GRBL's planner each time.
+///
+/// # Errors
+/// [`GcodeError`].
+pub fn write(
+    toolpath: &Toolpath,
+    machine: &Machine,
+    material: &Material,
+) -> Result<String, GcodeError> {
+    let figures = toolpath.figures();
+    let mut w = Writer {
+        lines: Vec::new(),
+        at: None,
+        motion: "",
+        feed: String::new(),
+        power: String::new(),
+    };
+    w.line(format!("; kagome {}", env!("CARGO_PKG_VERSION")));
+    w.line(format!("; machine {}", machine.name));
+    w.line(format!("; material {}", material.name));
+    w.line(format!(
+        "; {} strokes, cut {} mm, travel {} mm",
+        figures.strokes,
+        short(figures.cut_length_mm, 0),
+        short(figures.travel_mm, 0)
+    ));
+    w.line("; needs laser mode: $32=1");
+    w.line("G21");
+    w.line("G90");
+    w.line("G17");
+    w.line("G94");
+    w.lines.extend(machine.job.preamble.iter().cloned());
+    let air = machine.laser.air_on.is_some();
+    w.lines.extend(machine.laser.air_on.iter().cloned());
+    w.line(match machine.laser.power_mode {
+        PowerMode::Dynamic => "M4 S0",
+        PowerMode::Constant => "M3 S0",
+    });
+    w.power = "0".into();
+    let mut role = None;
+    for cut in &toolpath.cuts {
+        if let Some(bad) = cut.points.iter().find(|p| !p.is_finite()) {
+            return Err(GcodeError::NotFinite { x: bad.x, y: bad.y });
+        }
+        if role != Some(cut.role) {
+            role = Some(cut.role);
+            w.line(match cut.role {
+                Role::Slit => "; slits",
+                Role::Inner => "; holes",
+                Role::Outer => "; rim",
+            });
+        }
+        let feed = short(cut.feed_mm_per_min, 0);
+        // Hundredths of a per cent and better, whatever the scale of S.
+        let power = short(machine.laser.s_max * cut.power_percent / 100.0, 1);
+        for (i, point) in cut.passes().enumerate() {
+            if i == 0 {
+                w.go("G0", point, None);
+            } else {
+                w.go("G1", point, Some((&feed, &power)));
+            }
+        }
+    }
+    w.line("M5");
+    if air {
+        w.lines.extend(machine.laser.air_off.iter().cloned());
+    }
+    let park = machine.job.park;
+    w.go("G0", Point::new(park.x_mm, park.y_mm), None);
+    w.lines.extend(machine.job.postamble.iter().cloned());
+    let limit = machine.controller.line_limit();
+    if let Some(line) = w.lines.iter().find(|l| l.len() > limit) {
+        return Err(GcodeError::LineTooLong {
+            line: line.clone(),
+            length: line.len(),
+            limit,
+        });
+    }
+    let mut text = w.lines.join("\n");
+    text.push('\n');
+    Ok(text)
+}
