@@ -3,10 +3,13 @@
 //! Exit codes: 0 done, 1 the answer is no, 2 bad usage or bad input. Results go to standard output (`--json` for
 //! machines), everything else to standard error.
 
-pub mod inspect;
-pub mod samples;
-pub mod surface_args;
+mod inspect;
+mod machines;
+mod materials;
+mod samples;
+mod surface_args;
 mod terminal;
+mod verify;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -47,6 +50,12 @@ enum Verb {
     Inspect(inspect::InspectArgs),
     /// List the sample surfaces, or write one as a file
     Samples(samples::SamplesArgs),
+    /// List, show and check machines
+    Machines(machines::MachinesArgs),
+    /// List, show and check materials
+    Materials(materials::MaterialsArgs),
+    /// Read G-code back and judge it: bed, beam, modes, and every cut of its sheet
+    Verify(verify::VerifyArgs),
 }
 
 /// Why a verb did not end with "done".
@@ -76,9 +85,13 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let terminal = Terminal::new(cli.global.quiet);
+    let global = &cli.global;
     let result = match &cli.verb {
-        Verb::Inspect(args) => inspect::run(args, &cli.global, &terminal),
-        Verb::Samples(args) => samples::run(args, &cli.global, &terminal),
+        Verb::Verify(args) => verify::run(args, global, &terminal),
+        Verb::Inspect(args) => inspect::run(args, global, &terminal),
+        Verb::Samples(args) => samples::run(args, global, &terminal),
+        Verb::Materials(args) => materials::run(args, global, &terminal),
+        Verb::Machines(args) => machines::run(args, global, &terminal),
     };
     terminal.clear();
     report(result)
@@ -103,4 +116,21 @@ fn report(result: Result<(), Failure>) -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// A line on standard output. A reader that has gone away (`| head`) is no error worth words.
+fn print(text: &str) -> Result<(), Failure> {
+    use std::io::Write as _;
+    match writeln!(std::io::stdout(), "{text}") {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::Bad(format!(
+            "standard output cannot be written: {e}"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// A value as JSON on standard output.
+fn print_json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(value).map_err(Failure::bad)?;
+    print(&text)
 }
