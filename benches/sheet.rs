@@ -1,0 +1,87 @@
+//! From linkage to verified G-code: sheet, order of cuts, text, verdict, for about 10³ and 10⁴ slits.
+
+use kagome::gcode;
+use kagome::linkage::{Handedness, Linkage};
+use kagome::machine::{self, Machine};
+use kagome::material::{self, CutSetting, Material};
+use kagome::pattern::{self, Sheet};
+use kagome::toolpath::{self, Toolpath};
+
+fn main() {
+    divan::main();
+}
+
+/// A hexagon of radius r has 9 r² − 3 r slits.
+const RADII: [i32; 2] = [11, 34];
+
+struct Case {
+    linkage: Linkage,
+    sheet: Sheet,
+    setting: CutSetting,
+    toolpath: Toolpath,
+    text: String,
+    machine: Machine,
+    material: Material,
+}
+
+fn case(radius: i32) -> Case {
+    let mut machine = machine::load(machine::DEFAULT).expect("shipped");
+    machine.bed.width_mm = 2000.0;
+    machine.bed.height_mm = 2000.0;
+    let material = material::load(material::DEFAULT).expect("shipped");
+    let setting = material.cut_for(&machine).expect("the defaults fit");
+    let linkage = Linkage::patch(7.0, Handedness::Right, &Linkage::hexagon_cells(radius));
+    let sheet = sheet(&linkage, &setting);
+    let (sheet, _) = pattern::placed(&sheet, &machine, false).expect("a large bed");
+    let toolpath = toolpath::plan(&sheet, &setting, [0.0, 0.0]).expect("wide slots");
+    let text = gcode::write(&toolpath, &machine, &material).expect("short lines");
+    Case {
+        linkage,
+        sheet,
+        setting,
+        toolpath,
+        text,
+        machine,
+        material,
+    }
+}
+
+fn sheet(linkage: &Linkage, setting: &CutSetting) -> Sheet {
+    Sheet::new(linkage, 1.0, setting.kerf_mm).expect("wide triangles")
+}
+
+#[divan::bench(args = RADII)]
+fn pattern_of(bencher: divan::Bencher<'_, '_>, radius: i32) {
+    let c = case(radius);
+    bencher.bench(|| sheet(&c.linkage, &c.setting));
+}
+
+#[divan::bench(args = RADII)]
+fn svg_of(bencher: divan::Bencher<'_, '_>, radius: i32) {
+    let c = case(radius);
+    bencher.bench(|| pattern::svg(&c.sheet));
+}
+
+#[divan::bench(args = RADII)]
+fn svg_read(bencher: divan::Bencher<'_, '_>, radius: i32) {
+    let text = pattern::svg(&case(radius).sheet);
+    bencher.bench(|| pattern::read_svg(&text));
+}
+
+#[divan::bench(args = RADII, sample_count = 5)]
+fn order(bencher: divan::Bencher<'_, '_>, radius: i32) {
+    let c = case(radius);
+    bencher.bench(|| toolpath::plan(&c.sheet, &c.setting, [0.0, 0.0]));
+}
+
+#[divan::bench(args = RADII)]
+fn gcode_of(bencher: divan::Bencher<'_, '_>, radius: i32) {
+    let c = case(radius);
+    bencher.bench(|| gcode::write(&c.toolpath, &c.machine, &c.material));
+}
+
+#[divan::bench(args = RADII)]
+fn verify(bencher: divan::Bencher<'_, '_>, radius: i32) {
+    let c = case(radius);
+    bencher.bench(|| gcode::verify(&c.text, &c.machine, Some(&c.sheet), None));
+}
