@@ -34,11 +34,10 @@ pub fn run(args: &InspectArgs, global: &Global, _terminal: &Terminal) -> Result<
             "kind": found.kind(),
             "figures": found,
         });
-        print(&format!("{result:#}\n"));
+        print(&format!("{result:#}"))
     } else {
-        print(&text(&args.surface.surface, &import, &found));
+        print(&text(&args.surface.surface, &import, &found))
     }
-    Ok(())
 }
 
 fn text(name: &str, import: &Import, found: &Inspection) -> String {

@@ -3,13 +3,13 @@
 //! Exit codes: 0 done, 1 the answer is no, 2 bad usage or bad input. Results go to standard output (`--json` for
 //! machines), everything else to standard error.
 
-mod inspect;
-mod machines;
-mod materials;
-mod samples;
-mod surface_args;
+pub mod inspect;
+pub mod machines;
+pub mod materials;
+pub mod samples;
+pub mod surface_args;
 mod terminal;
-mod verify;
+pub mod verify;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -97,13 +97,6 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     report(result)
 }
 
-/// Prints to standard output. A reader that has gone away (`| head`) is no error.
-pub(crate) fn print(text: &str) {
-    use std::io::Write as _;
-    let mut out = std::io::stdout().lock();
-    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-}
-
 fn report(result: Result<(), Failure>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -118,10 +111,10 @@ fn report(result: Result<(), Failure>) -> ExitCode {
     }
 }
 
-/// A line on standard output. A reader that has gone away (`| head`) is no error worth words.
+/// Text on standard output, ended by a line end. A reader that has gone away (`| head`) is no error worth words.
 fn print(text: &str) -> Result<(), Failure> {
     use std::io::Write as _;
-    match writeln!(std::io::stdout(), "{text}") {
+    match writeln!(std::io::stdout(), "{}", text.trim_end()) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::Bad(format!(
             "standard output cannot be written: {e}"
         ))),

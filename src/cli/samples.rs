@@ -45,7 +45,7 @@ enum What {
 pub fn run(args: &SamplesArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
     match &args.what {
         What::List => {
-            print(&if global.json { list_json() } else { list() });
+            print(&if global.json { list_json() } else { list() })?;
             Ok(())
         }
         What::Write {
@@ -57,7 +57,7 @@ pub fn run(args: &SamplesArgs, global: &Global, terminal: &Terminal) -> Result<(
             let surface = sample.generate().map_err(Failure::bad)?;
             let text = surface_obj(&format!("kagome sample:{sample}\nmillimetres"), &surface);
             let Some(path) = output else {
-                print(&text);
+                print(&text)?;
                 return Ok(());
             };
             if path.exists() && !force {
@@ -74,7 +74,7 @@ pub fn run(args: &SamplesArgs, global: &Global, terminal: &Terminal) -> Result<(
                     "vertices": surface.positions().len(),
                     "faces": surface.faces().len(),
                 });
-                print(&format!("{result:#}\n"));
+                print(&format!("{result:#}"))?;
             } else {
                 terminal.note(&format!(
                     "{}: {} vertices, {} faces",

@@ -12,5 +12,5 @@ mod verify;
 mod write;
 
 pub use interpret::{Beam, Move, Program, read};
-pub use verify::{Finding, Rule, TOLERANCE_MM, Verdict, verify};
+pub use verify::{Finding, Rule, TOLERANCE_MM, Verdict, compare_burnt, verify};
 pub use write::{GcodeError, write};

@@ -143,7 +143,21 @@ pub fn verify(
         let once = wanted.length_mm();
         let n = passes.unwrap_or_else(|| (burnt_mm / once).round().clamp(1.0, 1000.0) as u32);
         found_passes = Some(n);
-        compare(&program, &wanted, n, &mut findings);
+        let burnt: Vec<(Option<usize>, Segment)> = program
+            .moves
+            .iter()
+            .filter(|m| m.burns())
+            .map(|m| {
+                (
+                    Some(m.line),
+                    Segment {
+                        a: m.from.unwrap_or(m.to),
+                        b: m.to,
+                    },
+                )
+            })
+            .collect();
+        compare(&burnt, &wanted, n, NO_GAP_MM, &mut findings);
     }
     findings.sort_by_key(|f| f.line.unwrap_or(usize::MAX));
     Ok(Verdict {
@@ -296,18 +310,40 @@ impl Wanted {
     }
 }
 
-fn compare(program: &Program, wanted: &Wanted, passes: u32, findings: &mut Vec<Finding>) {
-    let mut lines = Vec::new();
-    let mut burnt = Vec::new();
-    for m in program.moves.iter().filter(|m| m.burns()) {
-        lines.push(m.line);
-        burnt.push(Segment {
-            a: m.from.unwrap_or(m.to),
-            b: m.to,
-        });
-    }
+/// Judges what a machine has really burnt, as straight pieces in the sheet's frame, against the sheet: every cut as
+/// often as wanted but for gaps up to `gap_mm`, and nothing else. Findings carry no line.
+///
+/// # Tolerance
+/// Sideways [`TOLERANCE_MM`]. `gap_mm` is for what a controller does at the ends of a stroke, where it switches the
+/// beam off a little before it stands.
+///
+/// # Errors
+/// [`ToolpathError`] if the sheet itself cannot be cut with its kerf.
+pub fn compare_burnt(
+    sheet: &Sheet,
+    burnt: &[[Point; 2]],
+    passes: u32,
+    gap_mm: f64,
+) -> Result<Vec<Finding>, ToolpathError> {
+    let burnt: Vec<(Option<usize>, Segment)> = burnt
+        .iter()
+        .map(|&[a, b]| (None, Segment { a, b }))
+        .collect();
+    let mut findings = Vec::new();
+    compare(&burnt, &Wanted::new(sheet)?, passes, gap_mm, &mut findings);
+    Ok(findings)
+}
+
+/// Compares burnt pieces, with their lines where there are lines, with what is wanted.
+fn compare(
+    burnt: &[(Option<usize>, Segment)],
+    wanted: &Wanted,
+    passes: u32,
+    gap_mm: f64,
+    findings: &mut Vec<Finding>,
+) {
     let passes = passes as i32;
-    let burnt_index = Index::new(burnt.clone());
+    let burnt_index = Index::new(burnt.iter().map(|(_, s)| *s).collect());
     let mut pieces = Pieces::default();
     for (name, range) in &wanted.cuts {
         // Per cut: total length and worst count of what is missing and repeated, and the first place of each.
@@ -323,7 +359,7 @@ fn compare(program: &Program, wanted: &Wanted, passes: u32, findings: &mut Vec<F
             pieces.runs(
                 true,
                 length,
-                NO_GAP_MM,
+                gap_mm,
                 |n| n < passes,
                 |run, n| note(&mut missing, run, n),
             );
@@ -370,7 +406,7 @@ fn compare(program: &Program, wanted: &Wanted, passes: u32, findings: &mut Vec<F
         }
     }
     let wanted_index = Index::new(wanted.segments.clone());
-    for (segment, line) in burnt.iter().zip(lines) {
+    for (line, segment) in burnt {
         wanted_index.along(segment, TOLERANCE_MM, &mut pieces);
         let length = segment.length();
         let mut stray: Option<(f64, Point)> = None;
@@ -391,15 +427,15 @@ fn compare(program: &Program, wanted: &Wanted, passes: u32, findings: &mut Vec<F
             );
         }
         if let Some((length, at)) = stray {
-            findings.push(Finding::at(
-                line,
-                Rule::Stray,
-                format!(
+            findings.push(Finding {
+                line: *line,
+                rule: Rule::Stray,
+                text: format!(
                     "{} mm are burnt where the sheet has no cut, near {}",
                     short(length, 3),
                     place(at)
                 ),
-            ));
+            });
         }
     }
 }
