@@ -9,5 +9,6 @@ pub mod machine;
 pub mod material;
 pub mod mesh;
 pub mod pattern;
+pub mod planner;
 pub mod rationalize;
 pub mod toolpath;
