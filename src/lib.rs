@@ -3,6 +3,7 @@
 pub mod base;
 pub mod cli;
 pub mod conformal;
+pub mod control;
 pub mod gcode;
 pub mod linkage;
 pub mod machine;
@@ -11,4 +12,5 @@ pub mod mesh;
 pub mod pattern;
 pub mod planner;
 pub mod rationalize;
+pub mod sim;
 pub mod toolpath;

@@ -6,7 +6,10 @@
 pub mod inspect;
 pub mod machines;
 pub mod materials;
+pub mod ports;
 pub mod samples;
+pub mod send;
+pub mod sim;
 pub mod surface_args;
 mod terminal;
 pub mod verify;
@@ -16,7 +19,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 
-pub use terminal::Terminal;
+pub use terminal::{ExitGuard, Terminal};
 
 /// From a surface to a verified, rehearsed cut.
 #[derive(Parser)]
@@ -56,6 +59,9 @@ enum Verb {
     Materials(materials::MaterialsArgs),
     /// Read G-code back and judge it: bed, beam, modes, and every cut of its sheet
     Verify(verify::VerifyArgs),
+    Send(send::SendArgs),
+    Sim(sim::SimArgs),
+    Ports(ports::PortsArgs),
 }
 
 /// Why a verb did not end with "done".
@@ -92,6 +98,9 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Verb::Samples(args) => samples::run(args, global, &terminal),
         Verb::Materials(args) => materials::run(args, global, &terminal),
         Verb::Machines(args) => machines::run(args, global, &terminal),
+        Verb::Send(args) => send::run(args, global, &terminal),
+        Verb::Sim(args) => sim::run(args, global, &terminal),
+        Verb::Ports(args) => ports::run(args, global, &terminal),
     };
     terminal.clear();
     report(result)

@@ -1,7 +1,7 @@
 //! Progress on a terminal, quiet lines elsewhere, and Ctrl-C as a polite request.
 
-use std::io::IsTerminal as _;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::io::{IsTerminal as _, Write as _};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -14,22 +14,58 @@ pub struct Terminal {
     quiet: bool,
     bar: Option<Mutex<ProgressBar>>,
     stop: Arc<AtomicBool>,
+    guards: Arc<AtomicUsize>,
+}
+
+/// While it lives, no number of Ctrl-C ends the program: see [`Terminal::forbid_exit`].
+#[derive(Debug)]
+pub struct ExitGuard(Arc<AtomicUsize>);
+
+impl Drop for ExitGuard {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+/// A line on standard error. A terminal that was closed is no reason to panic in the middle of a job.
+fn tell(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 impl Terminal {
-    /// Takes over Ctrl-C: the first asks the work to stop, the second ends the program at once.
+    /// Takes over Ctrl-C, SIGTERM and SIGHUP (a closed terminal): the first asks the work to stop, the second ends the
+    /// program at once, unless an [`ExitGuard`] lives.
     pub fn new(quiet: bool) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
-        let flag = stop.clone();
+        let guards = Arc::new(AtomicUsize::new(0));
+        let (flag, held) = (stop.clone(), guards.clone());
         // A handler that cannot be set (one is there already) leaves the system's own: the program just ends.
         let _ = ctrlc::set_handler(move || {
-            if flag.swap(true, Ordering::Relaxed) {
-                std::process::exit(130);
+            if flag.swap(true, Ordering::SeqCst) {
+                if held.load(Ordering::SeqCst) == 0 {
+                    std::process::exit(130);
+                }
+                tell("still stopping the machine: wait until it is known that the beam is off");
             }
         });
         let bar =
             (!quiet && std::io::stderr().is_terminal()).then(|| Mutex::new(ProgressBar::hidden()));
-        Self { quiet, bar, stop }
+        Self {
+            quiet,
+            bar,
+            stop,
+            guards,
+        }
+    }
+
+    /// Forbids the exit at the second Ctrl-C until the guard is dropped. Ending the program while a job runs would
+    /// leave the controller with a full buffer and nobody to stop it: the stop sequence (hold, reset, proof that the
+    /// beam is off) must come to its end, and an impatient person presses twice. It always ends: each of its steps
+    /// has a time limit.
+    #[must_use = "the exit is forbidden only while the guard lives"]
+    pub fn forbid_exit(&self) -> ExitGuard {
+        self.guards.fetch_add(1, Ordering::SeqCst);
+        ExitGuard(self.guards.clone())
     }
 
     /// The flag that Ctrl-C raises, for code that must react faster than by polling [`Progress`].
@@ -70,8 +106,8 @@ impl Progress for Terminal {
 
     fn note(&self, text: &str) {
         match self.bar.as_ref().map(Mutex::lock) {
-            Some(Ok(bar)) => bar.suspend(|| eprintln!("{text}")),
-            _ if !self.quiet => eprintln!("{text}"),
+            Some(Ok(bar)) => bar.suspend(|| tell(text)),
+            _ if !self.quiet => tell(text),
             _ => {}
         }
     }

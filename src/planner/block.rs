@@ -14,7 +14,9 @@ pub struct Limits {
 
 /// A limit that no machine has.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{what} is {value}, but must be a finite number above zero: correct it in the machine's settings")]
+#[error(
+    "{what} is {value}, but must be a finite number above zero: correct it in the machine's settings"
+)]
 pub struct LimitsError {
     /// The limit and its axis.
     pub what: String,

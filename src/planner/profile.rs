@@ -73,7 +73,9 @@ impl Profile {
         let exit = if needed <= length_mm {
             0.0
         } else {
-            (entry * entry - 2.0 * acceleration * length).max(0.0).sqrt()
+            (entry * entry - 2.0 * acceleration * length)
+                .max(0.0)
+                .sqrt()
         };
         Self {
             entry_mm_s: entry,

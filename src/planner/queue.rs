@@ -105,6 +105,11 @@ impl<T> Queue<T> {
         self.entries.front().map(|e| (&e.block, &e.payload))
     }
 
+    /// What rides with the last block.
+    pub fn back(&self) -> Option<&T> {
+        self.entries.back().map(|e| &e.payload)
+    }
+
     /// The fastest way along the rest of the first block, from its present speed to its planned exit.
     pub fn front_profile(&self) -> Option<Profile> {
         let front = self.entries.front()?;
@@ -122,8 +127,8 @@ impl<T> Queue<T> {
         self.entries.get(1).map_or(0.0, |e| e.entry_sqr)
     }
 
-    /// Says where the running block is: what is left of it and its speed now. Does not plan: call [`Queue::replan`]
-    /// after a hold, or [`Queue::push`].
+    /// Says where the running block is: what is left of it and its speed now. Does not plan: [`Queue::replan_all`]
+    /// and [`Queue::push`] do.
     pub fn set_front(&mut self, left_mm: f64, speed_mm_s: f64) {
         if let Some(front) = self.entries.front_mut() {
             front.block.length_mm = left_mm.max(0.0);
@@ -205,8 +210,7 @@ mod tests {
 
     fn path() -> impl Strategy<Value = Vec<Move>> {
         proptest::collection::vec(
-            (-5.0f64..5.0, -5.0f64..5.0, 300.0f64..6000.0)
-                .prop_map(|(x, y, rate)| to(x, y, rate)),
+            (-5.0f64..5.0, -5.0f64..5.0, 300.0f64..6000.0).prop_map(|(x, y, rate)| to(x, y, rate)),
             1..60,
         )
     }

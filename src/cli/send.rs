@@ -1,0 +1,112 @@
+//! `kagome send`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{Failure, Global, Terminal};
+use crate::control::{Job, JobRules, SendError, SendOptions, SendReport, SerialTransport, send};
+use crate::sim::{RehearsalError, RehearsalSummary, Settings, rehearse};
+
+/// Send a job to a machine, and stop it with proof if anything goes wrong
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:\n  \
+    kagome send mask/job.nc --port sim\n  \
+    kagome send mask/job.nc --port /dev/ttyUSB0\n\n\
+    Ctrl-C holds the machine, resets it, and waits until it reports that the beam is off.")]
+pub struct SendArgs {
+    /// The job: a G-code file
+    job: PathBuf,
+    /// The machine's port (see `kagome ports`), or `sim` for the machine that is built in
+    #[arg(long)]
+    port: String,
+    /// Rate of the serial line
+    #[arg(long, default_value_t = 115_200)]
+    baud: u32,
+    /// Send a job that uses M3: its beam stays on if the cable is pulled. Stay beside the machine
+    #[arg(long)]
+    allow_constant_power: bool,
+    /// The S word of full power that the job was made for; the controller's $30 must be the same
+    #[arg(long, value_name = "S")]
+    s_max: Option<f64>,
+}
+
+/// Sends a job.
+pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
+    let text = std::fs::read(&args.job).map_err(|error| {
+        Failure::Bad(format!(
+            "cannot read {}: {error}; nothing was sent",
+            args.job.display()
+        ))
+    })?;
+    let rules = JobRules {
+        allow_constant_power: args.allow_constant_power,
+        ..JobRules::default()
+    };
+    let here = |error| Failure::Bad(format!("{}: {error}", args.job.display()));
+    if args.port == "sim" {
+        let mut settings = Settings::default();
+        if let Some(s_max) = args.s_max {
+            settings.s_max = s_max;
+        }
+        let rehearsal =
+            rehearse(&text, &settings, &rules, terminal).map_err(|error| match error {
+                RehearsalError::Job(error) => here(error),
+                RehearsalError::Send(error) => failure(*error),
+            })?;
+        terminal.clear();
+        print(global, &rehearsal.report, Some(&rehearsal.summary));
+        return Ok(());
+    }
+    let job = Job::check(&text, &rules).map_err(here)?;
+    let options = SendOptions {
+        s_max: args.s_max,
+        ..SendOptions::default()
+    };
+    // From the opening on: it resets the board, and an exit in between would leave it to itself.
+    let guard = terminal.forbid_exit();
+    let mut port = SerialTransport::open(&args.port, args.baud).map_err(Failure::bad)?;
+    let result = send(&mut port, &job, &options, terminal);
+    drop(guard);
+    terminal.clear();
+    let report = result.map_err(failure)?;
+    print(global, &report, None);
+    Ok(())
+}
+
+/// A machine that cannot be reached is bad input; one that stopped, or refuses, is an answer.
+fn failure(error: SendError) -> Failure {
+    match error {
+        SendError::Connect { .. } | SendError::NoController { .. } => Failure::bad(error),
+        _ => Failure::No(error.to_string()),
+    }
+}
+
+fn print(global: &Global, report: &SendReport, summary: Option<&RehearsalSummary>) {
+    if global.json {
+        println!(
+            "{}",
+            serde_json::json!({ "report": report, "rehearsal": summary })
+        );
+        return;
+    }
+    println!(
+        "{} lines sent and acknowledged; the machine stands and its beam is off ({})",
+        report.acknowledged, report.firmware
+    );
+    let minutes = (report.time_s / 60.0).floor();
+    println!(
+        "time: {minutes:.0} min {:.1} s",
+        report.time_s - 60.0 * minutes
+    );
+    if let Some(s) = summary {
+        println!(
+            "burnt: {} cuts, {:.1} mm, beam on for {:.1} s",
+            s.strokes, s.burnt_mm, s.beam_on_s
+        );
+        println!(
+            "burnt while standing: {:.2} s; on rapids: {:.2} mm",
+            s.standing_burn_s, s.rapid_burn_mm
+        );
+    }
+}

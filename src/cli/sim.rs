@@ -1,0 +1,87 @@
+//! `kagome sim`.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{Failure, Global, Terminal};
+use crate::base::progress::Progress as _;
+use crate::sim::pty::{Link, PtyServer, Serve};
+use crate::sim::{Controller, RehearsalSummary, Settings};
+
+/// Serve the simulated machine on a pseudo-terminal, for this and other senders
+#[derive(Args, Debug)]
+#[command(after_help = "Example:\n  \
+    kagome sim --link /tmp/laser --speed max &\n  \
+    kagome send mask/job.nc --port /tmp/laser\n\n\
+    The path of the pseudo-terminal is the first line printed. Ctrl-C ends the machine; what was burnt is printed then.")]
+pub struct SimArgs {
+    /// A symbolic link to the pseudo-terminal, under a name that does not change
+    #[arg(long, value_name = "PATH")]
+    link: Option<PathBuf>,
+    /// The machine's seconds per second, or `max` for as fast as it is fed
+    #[arg(long, default_value = "1", value_parser = speed)]
+    speed: Speed,
+    /// End when the sender has closed the port and the machine has come to rest
+    #[arg(long)]
+    once: bool,
+    /// Do not start anew when the port is opened (as boards without a reset on DTR)
+    #[arg(long)]
+    no_reset_on_open: bool,
+}
+
+/// The machine's seconds per second of the wall; none for as fast as possible.
+#[derive(Clone, Copy, Debug)]
+struct Speed(Option<f64>);
+
+fn speed(text: &str) -> Result<Speed, String> {
+    if text == "max" {
+        return Ok(Speed(None));
+    }
+    match text.parse::<f64>() {
+        Ok(0.0) => Ok(Speed(None)),
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(Speed(Some(value))),
+        _ => Err("a number above zero, or max".into()),
+    }
+}
+
+/// Serves until Ctrl-C, or until the sender leaves.
+pub fn run(args: &SimArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
+    let mut server = PtyServer::open().map_err(Failure::bad)?;
+    let _link = match &args.link {
+        Some(path) => Some(Link::new(path, server.path()).map_err(Failure::bad)?),
+        None => None,
+    };
+    let path = server.path().to_owned();
+    if global.json {
+        println!("{}", serde_json::json!({ "port": path }));
+    } else {
+        println!("{path}");
+    }
+    // Programs that wait for the path read from a pipe.
+    let _ = std::io::stdout().flush();
+    let mut controller = Controller::new(Settings::default());
+    let how = Serve {
+        speed: args.speed.0,
+        once: args.once,
+        reset_on_open: !args.no_reset_on_open,
+    };
+    server.run(&mut controller, how, |_| terminal.interrupted());
+    let summary = RehearsalSummary::of(&controller);
+    if global.json {
+        println!(
+            "{}",
+            serde_json::json!({ "time_s": controller.now_s(), "burnt": summary })
+        );
+    } else if !global.quiet {
+        println!(
+            "burnt: {} cuts, {:.1} mm; while standing: {:.2} s; beam {} at the end",
+            summary.strokes,
+            summary.burnt_mm,
+            summary.standing_burn_s,
+            if summary.beam_on_at_end { "ON" } else { "off" },
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,23 @@
+//! From a job to a machine: checked, streamed, and stopped with proof.
+//!
+//! The rule of the house: *the beam is off unless the program means it on*, on every pause, error, disconnect, exit and
+//! crash path that software can reach. So a job is checked whole before a byte is sent ([`Job`]); the controller is
+//! asked what it is and how it is set; every byte sent has an owner until it is acknowledged; and every way out of a
+//! running job goes through a feed hold, a reset and a status report that shows the beam off, or says in plain words
+//! that this could not be confirmed ([`Proof`]).
+//!
+//! What software cannot do: an M3 (constant power) beam stays on after the cable is pulled, until the firmware ends
+//! it. M4 goes dark by itself when motion ends; so M3 is refused unless asked for.
+
+mod job;
+mod reply;
+pub mod script;
+mod send;
+mod serial;
+mod transport;
+
+pub use job::{Job, JobError, JobRules};
+pub use reply::{MachineState, Reply, Status};
+pub use send::{Confirmed, Proof, SendError, SendOptions, SendReport, StopReason, send};
+pub use serial::{PortError, SerialTransport, ports};
+pub use transport::Transport;

@@ -1,0 +1,218 @@
+//! What a GRBL controller says, line by line.
+
+/// What the machine does, as told by a status report.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MachineState {
+    /// Ready, at rest.
+    Idle,
+    /// Moving.
+    Run,
+    /// Feed hold; true once it stands.
+    Hold(bool),
+    /// Safety door; true once it stands.
+    Door(bool),
+    /// Locked.
+    Alarm,
+    /// Homing.
+    Home,
+    /// Checks G-code without moving.
+    Check,
+    /// Jogging.
+    Jog,
+    /// Asleep.
+    Sleep,
+}
+
+/// A status report.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Status {
+    /// What it does.
+    pub state: MachineState,
+    /// The position it tells, mm: machine coordinates, or work coordinates where the controller is set so.
+    pub position_mm: Option<[f64; 3]>,
+    /// Rate, mm/min.
+    pub rate_mm_min: Option<f64>,
+    /// Power of the output now, S.
+    pub s: Option<f64>,
+}
+
+impl Status {
+    /// True if this report proves that the machine stands and its beam is off.
+    pub fn dark_and_still(&self) -> bool {
+        let still = matches!(
+            self.state,
+            MachineState::Idle
+                | MachineState::Hold(true)
+                | MachineState::Door(true)
+                | MachineState::Alarm
+                | MachineState::Sleep
+                | MachineState::Check
+        );
+        still && self.s == Some(0.0)
+    }
+
+    fn parse(text: &str) -> Option<Self> {
+        let mut fields = text.strip_prefix('<')?.strip_suffix('>')?.split('|');
+        let state = match fields.next()? {
+            "Idle" => MachineState::Idle,
+            "Run" => MachineState::Run,
+            "Hold:0" => MachineState::Hold(true),
+            "Hold:1" => MachineState::Hold(false),
+            "Door:0" | "Door:1" => MachineState::Door(true),
+            "Door:2" | "Door:3" => MachineState::Door(false),
+            "Alarm" => MachineState::Alarm,
+            "Home" => MachineState::Home,
+            "Check" => MachineState::Check,
+            "Jog" => MachineState::Jog,
+            "Sleep" => MachineState::Sleep,
+            // grblHAL tells the number of the alarm.
+            other if other.starts_with("Alarm:") => MachineState::Alarm,
+            _ => return None,
+        };
+        let mut status = Self {
+            state,
+            position_mm: None,
+            rate_mm_min: None,
+            s: None,
+        };
+        for field in fields {
+            let (name, values) = field.split_once(':')?;
+            match name {
+                "MPos" | "WPos" => {
+                    let mut list = values.split(',').map(str::parse::<f64>);
+                    let mut place = [0.0; 3];
+                    for p in &mut place {
+                        *p = list.next()?.ok()?;
+                    }
+                    status.position_mm = Some(place);
+                }
+                "FS" => {
+                    let (rate, s) = values.split_once(',')?;
+                    status.rate_mm_min = Some(rate.parse().ok()?);
+                    // grblHAL adds a third figure.
+                    status.s = Some(s.split(',').next()?.parse().ok()?);
+                }
+                _ => {}
+            }
+        }
+        Some(status)
+    }
+}
+
+/// One line from the controller.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reply {
+    /// A line was taken.
+    Ok,
+    /// A line was refused.
+    Error(u32),
+    /// The controller has locked itself.
+    Alarm(u32),
+    /// The answer to `?`.
+    Status(Status),
+    /// The controller has started.
+    Banner(String),
+    /// `$n=value`.
+    Setting(u32, f64),
+    /// Anything in brackets.
+    Message(String),
+    /// None of these: noise, or another firmware.
+    Unknown(String),
+}
+
+impl Reply {
+    /// Reads a line without its end; none if it is empty.
+    pub fn parse(line: &str) -> Option<Self> {
+        let line = line.trim();
+        if line.is_empty() {
+            return None;
+        }
+        let number = |prefix: &str| line.strip_prefix(prefix)?.parse().ok();
+        let setting = || {
+            let (n, value) = line.strip_prefix('$')?.split_once('=')?;
+            // Some firmwares explain each setting in brackets behind it.
+            let value = value.split([' ', '(']).next()?;
+            Some(Self::Setting(n.parse().ok()?, value.parse().ok()?))
+        };
+        Some(if line == "ok" {
+            Self::Ok
+        } else if let Some(n) = number("error:") {
+            Self::Error(n)
+        } else if let Some(n) = number("ALARM:") {
+            Self::Alarm(n)
+        } else if let Some(status) = Status::parse(line) {
+            Self::Status(status)
+        } else if line.starts_with("Grbl") {
+            Self::Banner(line.to_owned())
+        } else if let Some(setting) = setting() {
+            setting
+        } else if line.starts_with('[') && line.ends_with(']') {
+            Self::Message(line.to_owned())
+        } else {
+            Self::Unknown(line.to_owned())
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_of_line_is_told_apart() {
+        let status = Reply::parse("<Hold:0|MPos:1.000,-2.500,0.000|FS:0,0|WCO:0.000,0.000,0.000>");
+        let Some(Reply::Status(status)) = status else {
+            panic!("{status:?}");
+        };
+        assert_eq!(status.position_mm, Some([1.0, -2.5, 0.0]));
+        assert!(status.dark_and_still());
+        assert_eq!(Reply::parse("ok\r"), Some(Reply::Ok));
+        assert_eq!(Reply::parse("error:22"), Some(Reply::Error(22)));
+        assert_eq!(Reply::parse("ALARM:3"), Some(Reply::Alarm(3)));
+        assert_eq!(
+            Reply::parse("$30=1000.000"),
+            Some(Reply::Setting(30, 1000.0))
+        );
+        assert_eq!(Reply::parse(" "), None);
+        for (text, banner) in [
+            ("Grbl 1.1h ['$' for help]", true),
+            ("GrblHAL 1.1f", true),
+            ("start", false),
+        ] {
+            assert_eq!(
+                matches!(Reply::parse(text), Some(Reply::Banner(_))),
+                banner,
+                "{text}"
+            );
+        }
+        assert!(matches!(
+            Reply::parse("[MSG:Pgm End]"),
+            Some(Reply::Message(_))
+        ));
+    }
+
+    #[test]
+    fn a_damaged_line_proves_nothing() {
+        for text in [
+            "<Idle|FS:0,0",
+            "<Idle|FS:0>",
+            "<Idle|MPos:1,2|FS:0,0>",
+            "oj",
+            "<Idlf|FS:0,0>",
+            "error:",
+        ] {
+            assert!(
+                matches!(Reply::parse(text), Some(Reply::Unknown(_))),
+                "{text}"
+            );
+        }
+        let Some(Reply::Status(status)) = Reply::parse("<Idle|MPos:0,0,0>") else {
+            panic!("a report without power is still a report");
+        };
+        assert!(!status.dark_and_still());
+        let Some(Reply::Status(status)) = Reply::parse("<Idle|FS:0,500>") else {
+            panic!("a report");
+        };
+        assert!(!status.dark_and_still(), "M3 standing in Idle burns");
+    }
+}

@@ -1,0 +1,29 @@
+//! A line to a machine, and its clock.
+
+use std::io;
+use std::time::Duration;
+
+/// Bytes both ways, and the time that passes between them.
+///
+/// The sender takes its time from here, never from the system: on a real port it is the wall's, in the simulated
+/// machine it is virtual and moves only while [`Transport::receive`] waits, so the same sender code runs a job of
+/// twenty minutes in milliseconds.
+pub trait Transport {
+    /// Sends all of `bytes`.
+    ///
+    /// # Errors
+    /// Whatever makes the link unusable; nothing is known about how many bytes arrived.
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Waits at most `wait` for bytes and gives how many were put into `buffer`: 0 if none came in time.
+    ///
+    /// # Errors
+    /// Any error means that the link is lost; silence is not an error.
+    fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize>;
+
+    /// The time on this link's clock, from some fixed moment.
+    fn now(&self) -> Duration;
+
+    /// What to call it in messages: a path, or "the simulated machine".
+    fn name(&self) -> &str;
+}

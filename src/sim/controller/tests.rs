@@ -1,0 +1,348 @@
+//! The table "case | beam" as measured on stock GRBL 1.1h, and the rest of the controller's manners.
+
+use super::*;
+
+/// A machine and what it has said.
+struct Bench {
+    machine: Controller,
+    said: Vec<u8>,
+}
+
+impl Bench {
+    fn new(settings: Settings) -> Self {
+        let mut bench = Self {
+            machine: Controller::new(settings),
+            said: Vec::new(),
+        };
+        bench.wait(0.1);
+        bench.said.clear();
+        bench
+    }
+
+    fn laser() -> Self {
+        Self::new(Settings::default())
+    }
+
+    fn wait(&mut self, seconds: f64) -> String {
+        let until = self.machine.now_s() + seconds;
+        self.machine.advance(until);
+        let mut new = Vec::new();
+        self.machine.read(&mut new);
+        self.said.extend_from_slice(&new);
+        String::from_utf8(new).unwrap()
+    }
+
+    fn send(&mut self, text: &str, seconds: f64) -> String {
+        self.machine.write(text.as_bytes());
+        self.wait(seconds)
+    }
+
+    fn raw(&mut self, byte: u8, seconds: f64) -> String {
+        self.machine.write(&[byte]);
+        self.wait(seconds)
+    }
+
+    fn standing_s(&self) -> f64 {
+        let burns = self.machine.burns();
+        let standing = burns.iter().filter(|b| b.standing());
+        standing.map(|b| b.end_s - b.start_s).sum()
+    }
+}
+
+const M3: &str = "G21G90\nM3S500\nG1F3000\nG0X10\n";
+const M4: &str = "G21G90\nM4S500\nG1F3000\nG0X10\n";
+
+#[test]
+fn starved_or_unplugged_with_m3_the_buffered_lines_run_and_the_beam_stays_on() {
+    let mut b = Bench::laser();
+    b.send(M3, 0.0);
+    b.send("G1X60\nG1Y50\n", 30.0);
+    assert_eq!(b.machine.state(), State::Idle);
+    assert_eq!(b.machine.position_mm(), [60.0, 50.0, 0.0]);
+    assert!(b.machine.beam_on());
+    assert!(b.standing_s() > 20.0, "{}", b.standing_s());
+}
+
+#[test]
+fn starved_or_unplugged_with_m4_the_buffered_lines_run_and_the_beam_is_off() {
+    let mut b = Bench::laser();
+    b.send(M4, 0.0);
+    b.send("G1X60\nG1Y50\n", 30.0);
+    assert_eq!(b.machine.position_mm(), [60.0, 50.0, 0.0]);
+    assert!(!b.machine.beam_on());
+    assert_eq!(b.standing_s(), 0.0);
+}
+
+#[test]
+fn a_hold_in_laser_mode_is_dark_once_standing_and_resume_restores_the_beam() {
+    for start in [M3, M4] {
+        let mut b = Bench::laser();
+        b.send(start, 0.0);
+        b.send("G1X60\n", 0.7);
+        assert!(b.machine.beam_on());
+        b.raw(b'!', 0.05);
+        assert_eq!(b.machine.state(), State::Hold { standing: false });
+        b.wait(0.5);
+        assert_eq!(b.machine.state(), State::Hold { standing: true });
+        assert!(!b.machine.beam_on());
+        let place = b.machine.position_mm()[0];
+        assert!(place > 12.0 && place < 59.0, "{place}");
+        let report = b.raw(b'?', 0.1);
+        assert!(
+            report.contains("<Hold:0|") && report.contains("|FS:0,0"),
+            "{report}"
+        );
+        b.raw(b'~', 0.1);
+        assert!(b.machine.beam_on());
+        b.wait(3.0);
+        assert_eq!(b.machine.position_mm()[0], 60.0);
+        assert_eq!(b.standing_s() > 0.0, start == M3);
+    }
+}
+
+#[test]
+fn a_reset_in_motion_is_dark_raises_alarm_3_and_locks() {
+    for start in [M3, M4] {
+        let mut b = Bench::laser();
+        b.send(start, 0.0);
+        b.send("G1X60\n", 0.7);
+        assert!(b.machine.beam_on());
+        let said = b.raw(0x18, 0.1);
+        assert!(!b.machine.beam_on());
+        assert!(said.contains("ALARM:3\r\n\r\nGrbl 1.1h"), "{said:?}");
+        assert!(said.contains("[MSG:'$H'|'$X' to unlock]"), "{said:?}");
+        assert!(b.send("G0X1\n", 0.1).contains("error:9"));
+        assert!(b.raw(b'?', 0.1).contains("<Alarm|"));
+        assert!(
+            b.send("$X\n", 0.1)
+                .contains("[MSG:Caution: Unlocked]\r\nok")
+        );
+        assert_eq!(b.machine.state(), State::Idle);
+    }
+}
+
+#[test]
+fn hold_then_reset_at_rest_is_dark_and_keeps_the_position() {
+    for start in [M3, M4] {
+        let mut b = Bench::laser();
+        b.send(start, 0.0);
+        b.send("G1X60\n", 0.7);
+        b.raw(b'!', 0.5);
+        let place = b.machine.position_mm();
+        // With M3 the bare G1 of the preamble has burnt for a moment already.
+        let before = b.standing_s();
+        let said = b.raw(0x18, 0.1);
+        assert!(!said.contains("ALARM"), "{said:?}");
+        assert_eq!(b.machine.state(), State::Idle);
+        assert_eq!(b.machine.position_mm(), place);
+        b.wait(5.0);
+        assert!(!b.machine.beam_on());
+        assert_eq!(b.standing_s(), before);
+    }
+}
+
+#[test]
+fn a_hold_without_laser_mode_leaves_the_output_on_until_the_door_or_a_spindle_stop() {
+    for stop in [0x84, 0x9e] {
+        let mut b = Bench::new(Settings {
+            laser_mode: false,
+            ..Settings::default()
+        });
+        b.send("G21G90\nM3S500\nG1F3000X60\n", 0.7);
+        b.raw(b'!', 1.0);
+        assert_eq!(b.machine.state(), State::Hold { standing: true });
+        assert!(b.machine.beam_on(), "the output stays on while holding");
+        b.raw(stop, 0.1);
+        assert!(!b.machine.beam_on());
+    }
+}
+
+#[test]
+fn m3_then_a_bare_g1_then_a_dwell_burns_while_standing() {
+    let mut b = Bench::laser();
+    b.send("G21G90\nG1F600\nG0X5\nM3S500\nG1\nG4P1\n", 0.6);
+    assert_eq!(b.machine.position_mm()[0], 5.0);
+    assert!(b.machine.beam_on());
+    b.wait(1.0);
+    assert!(b.standing_s() > 0.9);
+}
+
+#[test]
+fn a_burst_without_counting_loses_bytes_in_silence() {
+    let mut b = Bench::laser();
+    let mut burst = String::from("G21G90\nM4S500\nG1F600\n");
+    for k in 0..57 {
+        burst.push_str(&format!("G1X{}Y{}\n", 10 + k % 2 * 40, k));
+    }
+    let said = b.send(&burst, 400.0);
+    let answers = said.matches("ok").count() + said.matches("error:").count();
+    assert!(b.machine.lost_bytes() > 200, "{}", b.machine.lost_bytes());
+    assert!(answers < 45, "{answers} of 60 lines were answered");
+}
+
+#[test]
+fn after_an_error_the_following_lines_still_run() {
+    let mut b = Bench::laser();
+    let said = b.send("G21G90\nG1F600\nG0X5Q3\nG1X7\n", 3.0);
+    assert_eq!(said, "ok\r\nok\r\nerror:20\r\nok\r\n");
+    assert_eq!(b.machine.position_mm()[0], 7.0);
+}
+
+#[test]
+fn a_line_of_79_characters_is_read_and_one_of_80_is_error_11() {
+    let mut b = Bench::laser();
+    let line = |n: usize| format!("G0X{}\n", "0".repeat(n - 3));
+    assert_eq!(b.send(&line(79), 1.0), "ok\r\n");
+    assert_eq!(b.send(&line(80), 1.0), "error:11\r\n");
+}
+
+#[test]
+fn questions_are_answered() {
+    let mut b = Bench::laser();
+    assert!(b.send("$I\n", 0.1).contains("[OPT:V,15,128]"));
+    let settings = b.send("$$\n", 0.3);
+    assert!(settings.contains("$32=1\r\n") && settings.contains("$11=0.010\r\n"));
+    assert!(settings.contains("$110=6000.000\r\n") && settings.ends_with("ok\r\n"));
+    assert!(
+        b.send("$G\n", 0.1)
+            .contains("[GC:G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0]")
+    );
+    assert!(b.send("$#\n", 0.3).contains("[G54:0.000,0.000,0.000]"));
+    assert!(b.send("$N\n", 0.1).contains("$N0="));
+    assert_eq!(b.send("$H\n", 0.1), "error:5\r\n");
+    assert_eq!(b.send("$Q\n", 0.1), "error:3\r\n");
+    assert_eq!(b.send("$20=1\n", 0.1), "error:10\r\n");
+    assert_eq!(b.send("$30=255\n", 0.2), "ok\r\n");
+    assert_eq!(b.machine.settings().s_max, 255.0);
+    b.send("G1X50F600\n", 0.2);
+    assert_eq!(b.send("$$\n", 0.1), "error:8\r\n");
+    assert!(b.raw(b'?', 0.1).contains("<Run|MPos:"));
+}
+
+#[test]
+fn a_report_tells_the_free_buffers_when_asked_to() {
+    let mut b = Bench::laser();
+    b.send("$10=3\n", 0.2);
+    assert!(b.raw(b'?', 0.1).contains("|Bf:15,128|"), "{:?}", b.said);
+}
+
+#[test]
+fn writing_a_setting_makes_the_controller_deaf() {
+    let mut b = Bench::laser();
+    b.send("$11=0.02\n", 0.01);
+    b.send("G1X9F600\n", 1.0);
+    assert!(b.machine.lost_bytes() > 0);
+}
+
+#[test]
+fn check_mode_checks_without_moving_and_leaving_it_resets() {
+    let mut b = Bench::laser();
+    assert_eq!(b.send("$C\n", 0.1), "[MSG:Enabled]\r\nok\r\n");
+    assert_eq!(b.send("G1X50F600\nG1X9Q1\n", 1.0), "ok\r\nerror:20\r\n");
+    assert!(b.raw(b'?', 0.1).contains("<Check|"));
+    let said = b.send("$C\n", 0.2);
+    assert!(
+        said.contains("[MSG:Disabled]\r\nok\r\n\r\nGrbl 1.1h"),
+        "{said:?}"
+    );
+    assert_eq!(
+        (b.machine.state(), b.machine.position_mm()),
+        (State::Idle, [0.0; 3])
+    );
+}
+
+#[test]
+fn soft_limits_stop_the_machine_deafen_it_and_keep_the_beam_off() {
+    let mut b = Bench::new(Settings {
+        homing: true,
+        soft_limits: true,
+        homing_seek_mm_min: 60_000.0,
+        ..Settings::default()
+    });
+    assert!(
+        b.send("G0X-5\n", 0.1).contains("error:9"),
+        "locked until homed"
+    );
+    b.send("$H\n", 5.0);
+    assert_eq!(b.machine.position_mm(), [-1.0; 3]);
+    let said = b.send("M4S500\nG1X-100F3000\nG1X10\n", 5.0);
+    assert!(
+        said.contains("ALARM:2\r\n[MSG:Reset to continue]"),
+        "{said:?}"
+    );
+    assert!(!b.machine.beam_on());
+    assert_eq!(b.raw(b'?', 5.0), "", "silence is not a disconnect");
+    let said = b.raw(0x18, 0.2);
+    assert!(
+        said.contains("Grbl 1.1h") && said.contains("to unlock"),
+        "{said:?}"
+    );
+    assert!(b.raw(b'?', 0.1).contains("<Alarm|"));
+}
+
+#[test]
+fn the_door_stops_dark_and_lets_go_on() {
+    let mut b = Bench::laser();
+    b.send(M4, 0.0);
+    b.send("G1X60\n", 0.7);
+    b.raw(0x84, 1.0);
+    assert_eq!(b.machine.state(), State::Door { standing: true });
+    assert!(!b.machine.beam_on());
+    b.raw(b'~', 5.0);
+    assert_eq!(b.machine.position_mm()[0], 60.0);
+}
+
+#[test]
+fn dwells_run_in_steps_of_50_ms_and_wait_while_held() {
+    let mut b = Bench::laser();
+    b.send("G4P0.06\n", 0.095);
+    assert_eq!(b.said, b"");
+    b.wait(0.05);
+    assert_eq!(b.said, b"ok\r\n");
+    b.said.clear();
+    b.send("G4P1\n", 0.5);
+    b.raw(b'!', 3.0);
+    assert_eq!(b.said, b"");
+    b.raw(b'~', 0.3);
+    assert_eq!(b.said, b"");
+    b.wait(0.4);
+    assert_eq!(b.said, b"ok\r\n");
+}
+
+#[test]
+fn a_rapid_to_the_present_place_is_dropped_and_the_beam_goes_round_the_corner() {
+    let mut b = Bench::laser();
+    b.send(M4, 0.0);
+    b.send("G1X20\nG0X20\nG1Y10\nM5\nM2\n", 3.0);
+    let burns = b.machine.burns();
+    assert_eq!(burns.len(), 2);
+    assert_eq!(burns[0].end_s, burns[1].start_s);
+    assert_eq!(crate::sim::strokes(&burns, 0.0125).len(), 1);
+}
+
+#[test]
+fn the_end_of_a_program_switches_everything_off() {
+    let mut b = Bench::laser();
+    let said = b.send("M3S500\nG1X5F600\nM2\n", 3.0);
+    assert!(said.ends_with("[MSG:Pgm End]\r\nok\r\n"), "{said:?}");
+    assert!(!b.machine.beam_on());
+    assert_eq!(b.send("M0\n", 0.1), "");
+    assert_eq!(b.machine.state(), State::Hold { standing: true });
+    assert_eq!(b.raw(b'~', 0.1), "ok\r\n");
+}
+
+#[test]
+fn the_same_bytes_give_the_same_burns_however_the_clock_is_advanced() {
+    let job = format!("{M4}G1X60Y3\nG2X10Y3R40\nG0X0\nG1Y30\nM5\n");
+    let run = |step: f64| {
+        let mut b = Bench::laser();
+        b.machine.write(job.as_bytes());
+        while b.machine.now_s() < 12.0 {
+            b.wait(step);
+        }
+        b.machine.burns()
+    };
+    let whole = run(12.0);
+    assert!(whole.len() > 50, "{}", whole.len());
+    assert_eq!(whole, run(0.013));
+}

@@ -1,0 +1,23 @@
+//! The simulated machine: a GRBL 1.1h laser controller with its buffers, planner and clock, and a sheet that remembers
+//! what was burnt.
+//!
+//! It is the independent judge of our G-code and of our sender: it has its own interpreter and shares with the rest of
+//! the crate only the [`planner`](crate::planner) and the [`Transport`](crate::control::Transport) trait. In process it
+//! runs on a virtual clock ([`SimTransport`], [`rehearse`]); other programs reach it through a pseudo-terminal
+//! ([`pty`]).
+
+pub mod burnt;
+pub mod controller;
+mod link;
+mod modal;
+pub mod pty;
+mod rehearse;
+mod settings;
+mod words;
+
+pub use burnt::{Burn, Stroke, strokes};
+pub use controller::{Controller, State};
+pub use link::{Faults, SimTransport};
+pub use modal::Spindle;
+pub use rehearse::{Rehearsal, RehearsalError, RehearsalSummary, rehearse};
+pub use settings::Settings;

@@ -1,0 +1,105 @@
+//! A whole job on the simulated machine, through the sender that drives a real one.
+
+use serde::Serialize;
+
+use super::burnt::{Burn, Stroke, strokes};
+use super::controller::Controller;
+use super::link::SimTransport;
+use super::settings::Settings;
+use crate::base::progress::Progress;
+use crate::control::{Job, JobError, JobRules, SendError, SendOptions, SendReport, send};
+
+/// What a rehearsal showed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rehearsal {
+    /// Everything that was burnt, in order.
+    pub burns: Vec<Burn>,
+    /// The burns joined to strokes: the cuts, machine coordinates, mm.
+    pub strokes: Vec<Stroke>,
+    /// How long the machine took, s.
+    pub time_s: f64,
+    /// What the sender reports.
+    pub report: SendReport,
+    /// The figures that a person wants.
+    pub summary: RehearsalSummary,
+}
+
+/// A rehearsal in numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RehearsalSummary {
+    /// Number of cuts.
+    pub strokes: usize,
+    /// Length burnt, mm.
+    pub burnt_mm: f64,
+    /// Time with the beam on, s.
+    pub beam_on_s: f64,
+    /// Time with the beam on while the head stood still, s. Zero in a good job.
+    pub standing_burn_s: f64,
+    /// Length burnt on rapids, mm. Zero in a good job.
+    pub rapid_burn_mm: f64,
+    /// True if the beam was on at the end.
+    pub beam_on_at_end: bool,
+    /// Bytes lost to a full receive buffer. Zero for a good sender.
+    pub lost_bytes: u64,
+}
+
+impl RehearsalSummary {
+    /// The figures of what a machine has burnt.
+    pub fn of(controller: &Controller) -> Self {
+        let burns = controller.burns();
+        let tolerance_mm = step_mm(controller.settings());
+        Self {
+            strokes: strokes(&burns, tolerance_mm).len(),
+            burnt_mm: burns.iter().map(Burn::length_mm).sum(),
+            beam_on_s: burns.iter().map(|b| b.end_s - b.start_s).sum(),
+            standing_burn_s: burns
+                .iter()
+                .filter(|b| b.standing())
+                .map(|b| b.end_s - b.start_s)
+                .sum(),
+            rapid_burn_mm: burns.iter().filter(|b| b.rapid).map(Burn::length_mm).sum(),
+            beam_on_at_end: controller.beam_on(),
+            lost_bytes: controller.lost_bytes(),
+        }
+    }
+}
+
+/// One step of the coarser of the two motors, mm.
+fn step_mm(settings: &Settings) -> f64 {
+    1.0 / settings.steps_per_mm[0].min(settings.steps_per_mm[1])
+}
+
+/// Why a rehearsal did not come to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum RehearsalError {
+    /// The job is no job.
+    #[error(transparent)]
+    Job(#[from] JobError),
+    /// The sender stopped.
+    #[error("rehearsal: {0}")]
+    Send(#[from] Box<SendError>),
+}
+
+/// Runs a job on a simulated machine with these settings, which stands at its origin, as fast as possible.
+///
+/// # Errors
+/// What the sender would say at a real machine.
+pub fn rehearse(
+    job_text: &[u8],
+    settings: &Settings,
+    rules: &JobRules,
+    progress: &dyn Progress,
+) -> Result<Rehearsal, RehearsalError> {
+    let job = Job::check(job_text, rules)?;
+    let mut link = SimTransport::new(Controller::new(settings.clone()));
+    let report = send(&mut link, &job, &SendOptions::default(), progress).map_err(Box::new)?;
+    let controller = link.into_controller();
+    let burns = controller.burns();
+    Ok(Rehearsal {
+        strokes: strokes(&burns, step_mm(settings)),
+        burns,
+        time_s: report.time_s,
+        report,
+        summary: RehearsalSummary::of(&controller),
+    })
+}

@@ -1,0 +1,195 @@
+//! The numbers a GRBL controller keeps in its memory, `$0` to `$132`.
+
+use crate::planner::Limits;
+
+/// Settings of the simulated controller, with the defaults of GRBL 1.1's generic machine except where a laser needs
+/// otherwise: laser mode on, 80 steps/mm, rates and travel of a small frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// `$1`: how long the motors are held after each stop, ms; 255 keeps them on. It blocks the firmware.
+    pub step_idle_delay_ms: f64,
+    /// `$10`: what a status report holds; bit 0 machine position, bit 1 free buffers.
+    pub status_mask: f64,
+    /// `$11`: junction deviation, mm.
+    pub junction_deviation_mm: f64,
+    /// `$12`: how far an arc's segments may stray from it, mm.
+    pub arc_tolerance_mm: f64,
+    /// `$13`: reports in inches (kept and reported, without effect here).
+    pub report_inches: f64,
+    /// `$20`: soft limits.
+    pub soft_limits: bool,
+    /// `$21`: hard limits (kept and reported; the simulated frame has no switches).
+    pub hard_limits: bool,
+    /// `$22`: homing is required after power-up.
+    pub homing: bool,
+    /// `$23`: bit k set: axis k homes towards its negative end.
+    pub homing_direction_mask: f64,
+    /// `$25`: homing rate, mm/min.
+    pub homing_seek_mm_min: f64,
+    /// `$27`: distance from the switch after homing, mm.
+    pub homing_pull_off_mm: f64,
+    /// `$30`: the S word of full power.
+    pub s_max: f64,
+    /// `$31`: the S word of least power.
+    pub s_min: f64,
+    /// `$32`: laser mode.
+    pub laser_mode: bool,
+    /// `$100`–`$102`: steps per mm.
+    pub steps_per_mm: [f64; 3],
+    /// `$110`–`$112`: largest rates, mm/min.
+    pub max_rate_mm_min: [f64; 3],
+    /// `$120`–`$122`: accelerations, mm/s².
+    pub acceleration_mm_s2: [f64; 3],
+    /// `$130`–`$132`: travel, mm.
+    pub travel_mm: [f64; 3],
+    /// Receive buffer, bytes. Not a `$` setting: compiled in, and told by `$I`.
+    pub receive_buffer: usize,
+    /// Usable planner blocks. Compiled in, and told by `$I`.
+    pub planner_blocks: usize,
+    /// How long the firmware takes to read and plan a line, s per byte of it. Measured on an AVR: 5.3 kB/s, whether
+    /// as 330 lines of 16 bytes or 295 of 18.
+    pub byte_time_s: f64,
+    /// Speed of the serial line, baud at 10 bits a byte; none for a line that takes no time.
+    pub baud: Option<f64>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            step_idle_delay_ms: 25.0,
+            status_mask: 1.0,
+            junction_deviation_mm: 0.01,
+            arc_tolerance_mm: 0.002,
+            report_inches: 0.0,
+            soft_limits: false,
+            hard_limits: false,
+            homing: false,
+            homing_direction_mask: 0.0,
+            homing_seek_mm_min: 500.0,
+            homing_pull_off_mm: 1.0,
+            s_max: 1000.0,
+            s_min: 0.0,
+            laser_mode: true,
+            steps_per_mm: [80.0; 3],
+            max_rate_mm_min: [6000.0, 6000.0, 3000.0],
+            acceleration_mm_s2: [500.0; 3],
+            travel_mm: [500.0, 500.0, 200.0],
+            receive_buffer: 128,
+            planner_blocks: 15,
+            byte_time_s: 1.0 / 5300.0,
+            baud: Some(115_200.0),
+        }
+    }
+}
+
+/// One `$` setting: its number, value and how many decimals GRBL prints.
+pub(crate) type Row = (u16, f64, usize);
+
+impl Settings {
+    /// A laser in laser mode with these limits, bed and full-power S word; everything else as shipped.
+    pub fn laser(limits: &Limits, travel_mm: [f64; 3], s_max: f64) -> Self {
+        Self {
+            max_rate_mm_min: limits.max_rate_mm_min,
+            acceleration_mm_s2: limits.acceleration_mm_s2,
+            junction_deviation_mm: limits.junction_deviation_mm,
+            travel_mm,
+            s_max,
+            ..Self::default()
+        }
+    }
+
+    /// What the planner needs.
+    pub fn limits(&self) -> Limits {
+        Limits {
+            max_rate_mm_min: self.max_rate_mm_min,
+            acceleration_mm_s2: self.acceleration_mm_s2,
+            junction_deviation_mm: self.junction_deviation_mm,
+        }
+    }
+
+    /// The settings as `$$` lists them.
+    pub(crate) fn rows(&self) -> Vec<Row> {
+        let flag = |b: bool| f64::from(u8::from(b));
+        let mut rows = vec![
+            (0, 10.0, 0),
+            (1, self.step_idle_delay_ms, 0),
+            (2, 0.0, 0),
+            (3, 0.0, 0),
+            (4, 0.0, 0),
+            (5, 0.0, 0),
+            (6, 0.0, 0),
+            (10, self.status_mask, 0),
+            (11, self.junction_deviation_mm, 3),
+            (12, self.arc_tolerance_mm, 3),
+            (13, self.report_inches, 0),
+            (20, flag(self.soft_limits), 0),
+            (21, flag(self.hard_limits), 0),
+            (22, flag(self.homing), 0),
+            (23, self.homing_direction_mask, 0),
+            (24, 25.0, 3),
+            (25, self.homing_seek_mm_min, 3),
+            (26, 250.0, 0),
+            (27, self.homing_pull_off_mm, 3),
+            (30, self.s_max, 0),
+            (31, self.s_min, 0),
+            (32, flag(self.laser_mode), 0),
+        ];
+        for (base, values) in [
+            (100, self.steps_per_mm),
+            (110, self.max_rate_mm_min),
+            (120, self.acceleration_mm_s2),
+            (130, self.travel_mm),
+        ] {
+            for (k, value) in (0u16..).zip(values) {
+                rows.push((base + k, value, 3));
+            }
+        }
+        rows
+    }
+
+    /// Sets `$number`. Settings that have no meaning here (pulse lengths, pin inversions) are accepted and forgotten.
+    ///
+    /// # Errors
+    /// GRBL's number: 3 unknown setting, 4 negative, 10 soft limits without homing.
+    pub(crate) fn set(&mut self, number: u16, value: f64) -> Result<(), u8> {
+        if value < 0.0 {
+            return Err(4);
+        }
+        let on = value != 0.0;
+        match number {
+            0 | 2..=6 | 24 | 26 => {}
+            1 => self.step_idle_delay_ms = value.trunc(),
+            10 => self.status_mask = value.trunc(),
+            11 => self.junction_deviation_mm = value,
+            12 => self.arc_tolerance_mm = value.max(1e-6),
+            13 => self.report_inches = value,
+            20 if on && !self.homing => return Err(10),
+            20 => self.soft_limits = on,
+            21 => self.hard_limits = on,
+            22 => {
+                self.homing = on;
+                self.soft_limits &= on;
+            }
+            23 => self.homing_direction_mask = value.trunc(),
+            25 => self.homing_seek_mm_min = value.max(1.0),
+            27 => self.homing_pull_off_mm = value,
+            30 => self.s_max = value,
+            31 => self.s_min = value,
+            32 => self.laser_mode = on,
+            100..=132 => {
+                let axis = usize::from(number % 10);
+                let least = 1e-3;
+                let list = match number / 10 {
+                    10 => &mut self.steps_per_mm,
+                    11 => &mut self.max_rate_mm_min,
+                    12 => &mut self.acceleration_mm_s2,
+                    _ => &mut self.travel_mm,
+                };
+                // A zero would stop the planner for good; GRBL accepts it and hangs.
+                *list.get_mut(axis).ok_or(3u8)? = value.max(least);
+            }
+            _ => return Err(3),
+        }
+        Ok(())
+    }
+}
