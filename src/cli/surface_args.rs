@@ -68,3 +68,51 @@ impl SurfaceArgs {
         sample.import(&options).map_err(Failure::bad)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Probe {
+        #[command(flatten)]
+        surface: SurfaceArgs,
+    }
+
+    fn load(line: &str) -> Result<Import, Failure> {
+        let words = std::iter::once("probe").chain(line.split(' '));
+        Probe::try_parse_from(words)
+            .map_err(Failure::bad)?
+            .surface
+            .load()
+    }
+
+    #[test]
+    fn units_hold_for_samples_too() {
+        let width = |line: &str| {
+            let (low, high) = load(line).unwrap().surface.bounds();
+            (high - low).max()
+        };
+        assert!((width("sample:hemisphere") - 200.0).abs() < 0.5);
+        assert!((width("sample:hemisphere --size 50") - 50.0).abs() < 1e-9);
+        assert!((width("sample:hemisphere --unit in --scale 0.5") - 2540.0).abs() < 6.0);
+    }
+
+    #[test]
+    fn what_cannot_be_meant_is_refused() {
+        for (line, says) in [
+            ("sample:cone", "octasphere"),
+            ("no-such-file.obj", "no-such-file.obj: cannot be read"),
+            ("sample:cap --size 0", "--size 0 cannot be used"),
+            ("sample:cap --unit m", "more than 20 m"),
+            ("sample:cap --size 9 --unit m", "cannot be used with"),
+        ] {
+            match load(line) {
+                Err(Failure::Bad(text)) => assert!(text.contains(says), "{line}: {text}"),
+                other => panic!("{line}: {other:?}"),
+            }
+        }
+    }
+}

@@ -1,4 +1,19 @@
 //! Stage 1: a file or a sample becomes a [`Surface`]: an oriented manifold triangle mesh in millimetres.
+//!
+//! - [`read`]: OBJ, STL and PLY as triangles, with the line of what cannot be read;
+//! - [`repair`]: triangles into a surface: mended where that needs no guess, refused with place and remedy elsewhere;
+//! - [`samples`]: surfaces made here, by name;
+//! - [`closest`]: the closest point on a surface; [`edit`]: a point made a vertex;
+//! - [`check`]: figures for people; [`mod@write`]: OBJ text.
+//!
+//! ```
+//! use kagome::mesh::{ClosestPoint, Sample};
+//! let cap = Sample::parse("cap:half_angle_deg=45,faces=1000")?.generate()?;
+//! let above = nalgebra::Point3::new(0.0, 0.0, 130.0);
+//! let found = ClosestPoint::new(&cap).query(above);
+//! assert!((found.distance - 15.0).abs() < 1e-9);
+//! # Ok::<(), kagome::mesh::SampleError>(())
+//! ```
 
 pub mod check;
 pub mod closest;
