@@ -24,6 +24,9 @@ pub struct SendOptions {
     pub poll: Duration,
     /// How long a controller may be silent before it counts as lost.
     pub silence: Duration,
+    /// How long the machine may be paused (M0, a feed hold pressed at the machine, its door) before the job is
+    /// stopped. None waits for the person; a rehearsal has none to wait for.
+    pub longest_pause: Option<Duration>,
 }
 
 impl Default for SendOptions {
@@ -33,6 +36,7 @@ impl Default for SendOptions {
             banner_wait: Duration::from_secs(2),
             poll: Duration::from_millis(200),
             silence: Duration::from_secs(5),
+            longest_pause: None,
         }
     }
 }
@@ -158,6 +162,11 @@ pub enum StopReason {
         /// For how long, s.
         seconds: f64,
     },
+    /// The machine is paused and nobody resumes it.
+    Paused {
+        /// For how long, s.
+        seconds: f64,
+    },
     /// An answer that no line was waiting for, or a line that got none: bytes were lost or damaged.
     Ledger(String),
     /// The job was acknowledged to its end and the machine stands, but its beam is on.
@@ -184,6 +193,10 @@ impl fmt::Display for StopReason {
             Self::Silent { seconds } => {
                 write!(f, "the controller has not answered for {seconds:.1} s")
             }
+            Self::Paused { seconds } => write!(
+                f,
+                "the machine has been paused for {seconds:.0} s (M0 in the job, or a hold) and nobody resumes it"
+            ),
             Self::Ledger(what) => write!(
                 f,
                 "{what}: bytes were lost or damaged on the way; use a shorter, better shielded cable"
@@ -649,7 +662,7 @@ impl Sender<'_> {
         // Idle reports in a row with nothing else said: at the end, or with lines that will never be answered.
         let mut idle_since: Option<Duration> = None;
         let mut idle_reports = 0;
-        let mut holding = false;
+        let mut held_since: Option<Duration> = None;
         let patience = Duration::try_from_secs_f64(self.job.longest_dwell_s())
             .unwrap_or(Duration::from_secs(3600))
             + Duration::from_secs(3);
@@ -702,13 +715,28 @@ impl Sender<'_> {
                     let state = status.state;
                     let s = status.s;
                     self.status = Some(status);
-                    if matches!(state, MachineState::Hold(_) | MachineState::Door(_)) != holding {
-                        holding = !holding;
-                        self.progress.note(if holding {
-                            "the machine is paused; it goes on when resumed there, Ctrl-C ends the job"
-                        } else {
-                            "the machine goes on"
-                        });
+                    let holding = matches!(state, MachineState::Hold(_) | MachineState::Door(_));
+                    match held_since {
+                        None if holding => {
+                            held_since = Some(now);
+                            self.progress.note(
+                                "the machine is paused; it goes on when resumed there, Ctrl-C ends the job",
+                            );
+                        }
+                        Some(_) if !holding => {
+                            held_since = None;
+                            self.progress.note("the machine goes on");
+                        }
+                        Some(since)
+                            if self
+                                .options
+                                .longest_pause
+                                .is_some_and(|longest| now.saturating_sub(since) > longest) =>
+                        {
+                            let seconds = (now - since).as_secs_f64();
+                            return Err(Trouble::Stop(StopReason::Paused { seconds }));
+                        }
+                        _ => {}
                     }
                     if state == MachineState::Alarm {
                         return Err(Trouble::Stop(StopReason::Alarm(0)));

@@ -1,5 +1,7 @@
 //! A whole job on the simulated machine, through the sender that drives a real one.
 
+use std::time::Duration;
+
 use serde::Serialize;
 
 use super::burnt::{Burn, Stroke, strokes};
@@ -92,7 +94,11 @@ pub fn rehearse(
 ) -> Result<Rehearsal, RehearsalError> {
     let job = Job::check(job_text, rules)?;
     let mut link = SimTransport::new(Controller::new(settings.clone()));
-    let report = send(&mut link, &job, &SendOptions::default(), progress).map_err(Box::new)?;
+    let options = SendOptions {
+        longest_pause: Some(Duration::from_secs(60)),
+        ..SendOptions::default()
+    };
+    let report = send(&mut link, &job, &options, progress).map_err(Box::new)?;
     let controller = link.into_controller();
     let burns = controller.burns();
     Ok(Rehearsal {
