@@ -68,6 +68,9 @@ pub fn run(args: &SimArgs, global: &Global, terminal: &Terminal) -> Result<(), F
         reset_on_open: !args.no_reset_on_open,
     };
     server.run(&mut controller, how, |_| terminal.interrupted());
+    // The line is gone, the machine is not: what it had in its buffers still runs, as on a real one.
+    drop(server);
+    controller.run_out(3600.0);
     let summary = RehearsalSummary::of(&controller);
     if global.json {
         println!(

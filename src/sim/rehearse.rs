@@ -50,16 +50,15 @@ impl RehearsalSummary {
     pub fn of(controller: &Controller) -> Self {
         let burns = controller.burns();
         let tolerance_mm = step_mm(controller.settings());
+        // A fold from 0, because the sum of no numbers is -0, which a person should not have to read.
+        let total = |of: &dyn Fn(&Burn) -> f64| burns.iter().map(of).fold(0.0, |a, b| a + b);
+        let time = |b: &Burn| b.end_s - b.start_s;
         Self {
             strokes: strokes(&burns, tolerance_mm).len(),
-            burnt_mm: burns.iter().map(Burn::length_mm).sum(),
-            beam_on_s: burns.iter().map(|b| b.end_s - b.start_s).sum(),
-            standing_burn_s: burns
-                .iter()
-                .filter(|b| b.standing())
-                .map(|b| b.end_s - b.start_s)
-                .sum(),
-            rapid_burn_mm: burns.iter().filter(|b| b.rapid).map(Burn::length_mm).sum(),
+            burnt_mm: total(&Burn::length_mm),
+            beam_on_s: total(&time),
+            standing_burn_s: total(&|b| if b.standing() { time(b) } else { 0.0 }),
+            rapid_burn_mm: total(&|b| if b.rapid { b.length_mm() } else { 0.0 }),
             beam_on_at_end: controller.beam_on(),
             lost_bytes: controller.lost_bytes(),
         }

@@ -283,6 +283,20 @@ impl Controller {
         self.now_s = self.now_s.max(until_s);
     }
 
+    /// Lets the clock run until nothing moves and nothing is left to do, as after the cable was pulled: the lines in
+    /// the buffers still run. At most `limit_s` from now; true if it came to rest.
+    pub fn run_out(&mut self, limit_s: f64) -> bool {
+        let end = self.now_s + limit_s;
+        while !self.at_rest() && self.now_s < end {
+            let next = self.next_inside_s().clamp(self.now_s, end);
+            self.advance(next);
+            if next == end || !self.next_inside_s().is_finite() {
+                break;
+            }
+        }
+        self.at_rest()
+    }
+
     /// The power is cut: everything stops where it is, nothing is heard any more and the beam is off.
     pub fn power_off(&mut self) {
         self.position = self.position_mm();
