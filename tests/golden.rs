@@ -3,6 +3,8 @@
 //! When the output changes on purpose, `KAGOME_BLESS=1 cargo test --test golden` writes the files anew; read the
 //! difference before it is committed.
 
+#![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
+
 use std::path::Path;
 
 use kagome::linkage::{Handedness, Linkage};

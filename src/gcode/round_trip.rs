@@ -75,7 +75,7 @@ fn findings(text: &str, machine: &Machine, sheet: &Sheet, passes: u32) -> Vec<Fi
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 32, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
     #[test]
     fn what_we_write_is_what_the_sheet_wants(removed in removed(), left: bool, mirror: bool, passes in 1u32..4) {

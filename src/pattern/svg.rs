@@ -183,8 +183,11 @@ pub fn read_svg(text: &str) -> Result<Sheet, SvgError> {
         metadata,
     };
     for node in root.descendants().filter(roxmltree::Node::is_element) {
-        let line = document.text_pos_at(node.range().start).row;
-        let wrong = |problem: String| SvgError::Element { line, problem };
+        // The line is counted from the start of the file, so only for an error.
+        let wrong = |problem: String| SvgError::Element {
+            line: document.text_pos_at(node.range().start).row,
+            problem,
+        };
         if node.has_attribute("transform") {
             return Err(wrong(
                 "a transform moves this part; apply it in the drawing program first".into(),
