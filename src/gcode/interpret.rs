@@ -62,6 +62,8 @@ const ARC_RADIUS_SLACK_MM: f64 = 0.005;
 /// Chords of one full turn at the most, however large the radius.
 const ARC_CHORDS: f64 = 20_000.0;
 const MM_PER_INCH: f64 = 25.4;
+/// Larger numbers than any machine's, and far from where arithmetic fails: ten kilometres.
+const LARGEST_NUMBER: f64 = 1e7;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Motion {
@@ -153,8 +155,8 @@ fn words(raw: &str) -> Result<Vec<(char, f64)>, String> {
                 let value = number.parse::<f64>().map_err(|_| {
                     format!("`{letter}{number}` is no word: a letter needs a number")
                 })?;
-                if !value.is_finite() {
-                    return Err(format!("`{letter}{number}` is not a number"));
+                if value.is_nan() || value.abs() > LARGEST_NUMBER {
+                    return Err(format!("`{letter}{number}` is no number for a machine"));
                 }
                 words.push((letter.to_ascii_uppercase(), value));
                 rest = &body[end..];
@@ -554,6 +556,7 @@ mod tests {
             ("G2 X5 Y5", Rule::Syntax),
             ("G2 X5 Y5 I9 J9", Rule::Syntax),
             ("G4", Rule::Syntax),
+            ("G1 X99999999999999999999", Rule::Syntax),
             ("G1 Xé", Rule::Syntax),
             ("G0 X1 S5", Rule::BurnOnRapid),
         ] {

@@ -1,6 +1,6 @@
 //! Stage 8: a toolpath becomes text for a controller, and the text is read back and judged.
 //!
-//! [`write`] makes GRBL laser code. [`read`] is an interpreter that knows nothing of the writer: it gives the [`Move`]s
+//! [`write()`] makes GRBL laser code. [`read`] is an interpreter that knows nothing of the writer: it gives the [`Move`]s
 //! that a controller would make, beam and all, and complains by line. [`verify`] compares those moves with the machine
 //! and, where a sheet is given, with what it wants cut: every cut as often as asked, nothing else, nothing outside.
 

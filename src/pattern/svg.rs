@@ -6,7 +6,7 @@
 use kurbo::{BezPath, PathEl, Point, Rect};
 use svg::node::element::{Group, Path};
 
-use super::sheet::{Contour, Sheet, SheetMetadata, Slit, signed_area};
+use super::sheet::{Contour, Sheet, SheetMetadata, Slit, edges, signed_area};
 use crate::base::units::{fixed, short};
 
 /// A tenth of a micrometre: a hundredth of what the verifier tolerates.
@@ -14,6 +14,12 @@ const DECIMALS: usize = 4;
 
 /// The version of the attributes and groups.
 const FORMAT: &str = "1";
+
+/// Coordinates beyond a kilometre belong to no sheet, millimetres.
+const LARGEST_MM: f64 = 1e6;
+
+/// Shorter pieces have no direction at the precision of the file, millimetres.
+const SHORTEST_MM: f64 = 1e-3;
 
 /// Colours as laser programs sort operations by them.
 const CONTOUR: &str = "#ff0000";
@@ -144,7 +150,7 @@ pub enum SvgError {
     },
 }
 
-/// Reads an SVG that [`svg`] wrote.
+/// Reads an SVG that [`svg()`] wrote.
 ///
 /// # Errors
 /// [`SvgError`] with the line: not ours, a transform, a path that is not straight, a slit that is not one line.
@@ -225,6 +231,9 @@ pub fn read_svg(text: &str) -> Result<Sheet, SvgError> {
             (name, _) => return Err(wrong(format!("<{name}> is nothing that a sheet has"))),
         }
     }
+    if sheet.contours.is_empty() {
+        return Err(SvgError::NotOurs("the drawing has no contour".into()));
+    }
     Ok(sheet)
 }
 
@@ -253,9 +262,17 @@ fn polyline(d: &str) -> Result<(Vec<Point>, bool), String> {
             _ => return Err("a curve; a sheet has straight lines only".into()),
         }
     }
-    if points.iter().any(|p| !p.is_finite()) {
+    if points
+        .iter()
+        .any(|p| !p.is_finite() || p.x.abs().max(p.y.abs()) > LARGEST_MM)
+    {
         return Err(format!(
-            "path data {d:?} has a coordinate that is not a number"
+            "path data {d:?} has a coordinate that is on no sheet"
+        ));
+    }
+    if edges(&points).any(|(a, b)| a.distance(b) < SHORTEST_MM) {
+        return Err(format!(
+            "path data {d:?} has two neighbouring points on one spot"
         ));
     }
     Ok((
@@ -337,6 +354,24 @@ mod tests {
             let bad = good.replacen(from, to, 1);
             assert_ne!(bad, good, "the fixture changed: {from}");
             let text = read_svg(&bad).unwrap_err().to_string();
+            assert!(text.contains(word), "{text}");
+        }
+        let root = &good[..good.find('>').unwrap()];
+        for (path, word) in [
+            ("", "no contour"),
+            (
+                "<g id='contour'><path d='M0,0 L5,0 L5,0 L0,5 Z'/></g>",
+                "one spot",
+            ),
+            (
+                "<g id='contour'><path d='M0,0 L1e300,0 L0,5 Z'/></g>",
+                "on no sheet",
+            ),
+            ("<g id='contour'><path d='M0,0 L5,0 L0,5'/></g>", "open"),
+        ] {
+            let text = read_svg(&format!("{root}>{path}</svg>"))
+                .unwrap_err()
+                .to_string();
             assert!(text.contains(word), "{text}");
         }
         assert!(read_svg("<svg/>").is_err() && read_svg("").is_err() && read_svg("<a/>").is_err());
