@@ -5,6 +5,7 @@ pub mod cli;
 pub mod conformal;
 pub mod control;
 pub mod gcode;
+pub mod job;
 pub mod linkage;
 pub mod machine;
 pub mod material;

@@ -1,0 +1,335 @@
+//! `report.html`: what was decided, what came out, and where to look.
+//!
+//! One page that stands alone: style within, pictures as data URIs, drawings as SVG, no script, nothing fetched. It
+//! says first whether the job may be cut and why, then shows λ on the layout and on the surface, the linkage, its
+//! distance from the surface, the hinges, the sheet and the toolpath, and ends with every figure. [`html`] takes plain
+//! data: it measures nothing and decides nothing.
+
+mod histogram;
+mod strokes;
+mod table;
+mod text;
+mod views;
+
+use std::fmt::Write as _;
+
+use nalgebra::Point3;
+
+pub use histogram::histogram;
+pub use strokes::{Role, Stroke};
+pub use text::{escape, svg_element};
+
+use crate::base::ids::Per;
+use crate::base::units::short;
+use crate::conformal::Layout;
+use crate::job::picture::{ColourScale, Scene, View, legend};
+use crate::linkage::Linkage;
+use crate::mesh::{Surface, VertexId};
+use views::{Named, Style};
+
+/// One thing that decided the verdict.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reason {
+    /// In words, with the measured value.
+    pub text: String,
+    /// Where it is on the surface, millimetres: a numbered ring on the pictures.
+    pub at_mm: Option<Point3<f64>>,
+}
+
+impl From<String> for Reason {
+    fn from(text: String) -> Self {
+        Self { text, at_mm: None }
+    }
+}
+
+/// Whether the job may be cut.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Verdict {
+    /// True if everything is within its limit.
+    pub pass: bool,
+    /// Why not; or what was checked.
+    pub reasons: Vec<Reason>,
+}
+
+/// All that the page shows.
+#[derive(Clone, Copy, Debug)]
+pub struct Page<'a> {
+    /// Name of the job.
+    pub title: &'a str,
+    /// May it be cut?
+    pub verdict: &'a Verdict,
+    /// Name and value, in the order of reading: what a maker asks first.
+    pub summary: &'a [(String, String)],
+    /// What is not wrong but should be known, in words.
+    pub warnings: &'a [String],
+    /// The surface, millimetres.
+    pub surface: &'a Surface,
+    /// Its layout; λ is taken from here.
+    pub layout: &'a Layout,
+    /// The linkage.
+    pub linkage: &'a Linkage,
+    /// Where its points are in space, millimetres, by point.
+    pub positions: &'a [Point3<f64>],
+    /// How far its points are from the surface, in L, by point.
+    pub distances_in_l: &'a [f64],
+    /// The distance that the verdict allows, in L.
+    pub distance_limit_in_l: f64,
+    /// λ at every hinge.
+    pub openings: &'a [f64],
+    /// The largest λ that the material allows.
+    pub sigma: f64,
+    /// `pattern.svg`, if there is one.
+    pub sheet_svg: Option<&'a str>,
+    /// The toolpath in the order of the machine, if there is one.
+    pub toolpath: Option<&'a [Stroke]>,
+    /// `report.json`.
+    pub figures: &'a serde_json::Value,
+}
+
+/// Sizes of the pictures, pixels. All together a page stays within 2 MB for a surface of 20 000 faces.
+const VIEW_SIZE: [usize; 2] = [520, 520];
+const LARGE_SIZE: [usize; 2] = [760, 720];
+const LAYOUT_SIZE: [usize; 2] = [900, 640];
+
+/// Reach of the shade between triangles, in L.
+const SHADE_REACH: f64 = 0.45;
+
+/// The page as text. Lists that are shorter than the linkage asks for leave out or grey what they do not tell.
+pub fn html(page: &Page<'_>) -> String {
+    let mut out = String::with_capacity(2 << 20);
+    let _ = write!(
+        out,
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{0} · kagome</title><style>{1}</style></head>\n<body><main><h1>{0}</h1>\n",
+        escape(page.title),
+        include_str!("style.css")
+    );
+    verdict(&mut out, page);
+    summary(&mut out, page);
+    warnings(&mut out, page);
+    let places: Vec<(usize, Point3<f64>)> = page
+        .verdict
+        .reasons
+        .iter()
+        .enumerate()
+        .filter_map(|(i, r)| r.at_mm.map(|p| (i + 1, p)))
+        .collect();
+    stretch(&mut out, page, &places);
+    linkage(&mut out, page, &places);
+    hinges(&mut out, page);
+    sheet(&mut out, page);
+    toolpath(&mut out, page);
+    let _ = write!(
+        out,
+        "<section><h2>All figures</h2>{}</section>\n</main></body></html>\n",
+        table::table(page.figures)
+    );
+    out
+}
+
+fn verdict(out: &mut String, page: &Page<'_>) {
+    let (class, headline) = if page.verdict.pass {
+        ("pass", "✓ Pass: this can be cut")
+    } else {
+        ("fail", "✗ Fail: do not cut this")
+    };
+    let _ = write!(
+        out,
+        "<section class=\"verdict {class}\"><strong>{headline}</strong>"
+    );
+    if !page.verdict.reasons.is_empty() {
+        // Numbers lead to the rings on the pictures; where there are none, neither are numbers.
+        let numbered = page.verdict.reasons.iter().any(|r| r.at_mm.is_some());
+        let list = if numbered { "ol" } else { "ul" };
+        let _ = write!(out, "<{list}>");
+        for reason in &page.verdict.reasons {
+            let _ = write!(out, "<li>{}</li>", escape(&reason.text));
+        }
+        let _ = write!(out, "</{list}>");
+        if numbered {
+            out.push_str(
+                "<div>The numbers are ringed on the pictures (dashed: behind the object).</div>",
+            );
+        }
+    }
+    out.push_str("</section>");
+}
+
+fn summary(out: &mut String, page: &Page<'_>) {
+    if page.summary.is_empty() {
+        return;
+    }
+    out.push_str("<dl class=\"summary\">");
+    for (name, value) in page.summary {
+        let _ = write!(
+            out,
+            "<div><dt>{}</dt><dd>{}</dd></div>",
+            escape(name),
+            escape(value)
+        );
+    }
+    out.push_str("</dl>\n");
+}
+
+fn warnings(out: &mut String, page: &Page<'_>) {
+    if page.warnings.is_empty() {
+        return;
+    }
+    out.push_str("<section class=\"warnings\"><h2>Before you cut</h2><ul>");
+    for warning in page.warnings {
+        let _ = write!(out, "<li>{}</li>", escape(warning));
+    }
+    out.push_str("</ul></section>");
+}
+
+fn stretch(out: &mut String, page: &Page<'_>, places: &[(usize, Point3<f64>)]) {
+    let scale = ColourScale::scale_factor(page.sigma);
+    let values: Per<VertexId, f64> = page.layout.log_scale.iter().map(|x| x.exp()).collect();
+    let _ = write!(
+        out,
+        "<section><h2>Stretch</h2><p class=\"lead\">How much the sheet must open at each place: λ = 1 is closed, σ = {} is as far as the hinges of this material go.</p><div class=\"key\">{}</div>",
+        short(page.sigma, 3),
+        legend(
+            &scale,
+            "",
+            "below 1: the sheet cannot shrink, it would overlap",
+            "above σ: the hinges would tear"
+        )
+    );
+    let flat = [Named {
+        name: "on the flat layout",
+        view: View::flat(),
+    }];
+    let scene = Scene::layout(page.surface, page.layout, &values, &scale);
+    out.push_str(&views::figures(
+        &scene,
+        "stretch on the layout",
+        &flat,
+        Style {
+            size: LAYOUT_SIZE,
+            shade_mm: 0.0,
+        },
+        &[],
+    ));
+    let scene = Scene::surface(page.surface, &values, &scale);
+    let _ = write!(
+        out,
+        "<div class=\"grid\" style=\"margin-top:12px\">{}</div></section>",
+        views::figures(
+            &scene,
+            "stretch on the surface",
+            &views::around(View::front(page.surface)),
+            Style {
+                size: VIEW_SIZE,
+                shade_mm: 0.0,
+            },
+            places
+        )
+    );
+}
+
+fn linkage(out: &mut String, page: &Page<'_>, places: &[(usize, Point3<f64>)]) {
+    let around = views::around(View::front(page.surface));
+    let scene = Scene::linkage(page.surface, page.linkage, page.positions);
+    let _ = write!(
+        out,
+        "<section><h2>The opened sheet</h2><p class=\"lead\">{} rigid triangles of {} mm, joined at {} hinges, as they will stand in space. The pale body is the surface.</p><div class=\"grid two\">{}</div></section>",
+        page.linkage.triangles.len(),
+        short(page.linkage.edge_mm, 2),
+        page.linkage.hinges.len(),
+        views::figures(
+            &scene,
+            "the linkage",
+            &around[..2],
+            Style {
+                size: LARGE_SIZE,
+                shade_mm: SHADE_REACH * page.linkage.edge_mm,
+            },
+            places
+        )
+    );
+    let scale = ColourScale::distance(page.distance_limit_in_l);
+    let scene = Scene::linkage_by_value(
+        page.surface,
+        page.linkage,
+        page.positions,
+        page.distances_in_l,
+        &scale,
+    );
+    let _ = write!(
+        out,
+        "<section><h2>Distance from the surface</h2><p class=\"lead\">How far the corners of the triangles are from the surface, in triangle edges (L = {} mm).</p><div class=\"key\">{}</div><div class=\"grid\">{}</div></section>",
+        short(page.linkage.edge_mm, 2),
+        legend(
+            &scale,
+            " L",
+            "",
+            &format!(
+                "farther than the {} L allowed",
+                short(page.distance_limit_in_l, 3)
+            )
+        ),
+        views::figures(
+            &scene,
+            "distance from the surface",
+            &around,
+            Style {
+                size: VIEW_SIZE,
+                shade_mm: 0.0,
+            },
+            places
+        )
+    );
+}
+
+fn hinges(out: &mut String, page: &Page<'_>) {
+    let scale = ColourScale::scale_factor(page.sigma);
+    let _ = write!(
+        out,
+        "<section><h2>Hinges</h2><p class=\"lead\">How far each of the {} hinges is open, from closed (1) to the limit of the material (σ).</p><figure>{}</figure></section>",
+        page.openings.len(),
+        histogram(page.openings, &scale)
+    );
+}
+
+fn sheet(out: &mut String, page: &Page<'_>) {
+    let Some(svg) = page.sheet_svg.and_then(svg_element) else {
+        return;
+    };
+    let _ = write!(
+        out,
+        "<section><h2>The sheet</h2><p class=\"lead\">What is cut: slits, then the outline. Every slit ends a hinge's width before its star.</p><figure class=\"sheet\">{svg}<div class=\"note\"><span style=\"--c:#0000ff\">slits</span><span style=\"--c:#ff0000\">outline</span></div></figure></section>"
+    );
+}
+
+fn toolpath(out: &mut String, page: &Page<'_>) {
+    let Some(svg) = page.toolpath.and_then(strokes::drawing) else {
+        return;
+    };
+    let count = |role: Role| {
+        page.toolpath
+            .unwrap_or_default()
+            .iter()
+            .filter(|s| s.role == role)
+            .count()
+    };
+    let _ = write!(
+        out,
+        "<section><h2>Order of cutting</h2><p class=\"lead\">{} strokes for slits and {} for outlines, from the first (dot) to the last.</p><figure class=\"path\">{svg}<div class=\"note\"><span style=\"--c:{}\">first</span><span style=\"--c:{}\">last</span><span style=\"--c:{}\">travel, beam off</span>{}</div></figure></section>",
+        count(Role::Cut),
+        count(Role::Contour),
+        strokes::FIRST.css(),
+        strokes::LAST.css(),
+        strokes::TRAVEL.css(),
+        if count(Role::Mark) > 0 {
+            format!(
+                "<span style=\"--c:{}\">engraved marks</span>",
+                strokes::MARK.css()
+            )
+        } else {
+            String::new()
+        }
+    );
+}
+
+#[cfg(test)]
+mod tests;
