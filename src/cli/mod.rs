@@ -5,6 +5,7 @@
 
 pub mod inspect;
 pub mod machines;
+pub mod make;
 pub mod materials;
 pub mod ports;
 pub mod samples;
@@ -49,6 +50,8 @@ pub struct Global {
 
 #[derive(Subcommand)]
 enum Verb {
+    /// From a surface to a verified, rehearsed job: the main thing
+    Make(Box<make::MakeArgs>),
     /// Show what a surface is like: topology, size, curvature, defects
     Inspect(inspect::InspectArgs),
     /// List the sample surfaces, or write one as a file
@@ -93,6 +96,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let terminal = Terminal::new(cli.global.quiet);
     let global = &cli.global;
     let result = match &cli.verb {
+        Verb::Make(args) => make::run(args, global, &terminal),
         Verb::Verify(args) => verify::run(args, global, &terminal),
         Verb::Inspect(args) => inspect::run(args, global, &terminal),
         Verb::Samples(args) => samples::run(args, global, &terminal),

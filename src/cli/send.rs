@@ -6,6 +6,8 @@ use clap::Args;
 
 use super::{Failure, Global, Terminal};
 use crate::control::{Job, JobRules, SendError, SendOptions, SendReport, SerialTransport, send};
+use crate::gcode;
+use crate::machine::{self, Machine};
 use crate::sim::{RehearsalError, RehearsalSummary, Settings, rehearse};
 
 /// Send a job to a machine, and stop it with proof if anything goes wrong
@@ -20,15 +22,36 @@ pub struct SendArgs {
     /// The machine's port (see `kagome ports`), or `sim` for the machine that is built in
     #[arg(long)]
     port: String,
-    /// Rate of the serial line
-    #[arg(long, default_value_t = 115_200)]
-    baud: u32,
+    /// The machine's profile [default: the one that the job's header names]
+    #[arg(long, value_name = "NAME|FILE")]
+    machine: Option<String>,
+    /// Rate of the serial line [default: the profile's, or 115200]
+    #[arg(long)]
+    baud: Option<u32>,
     /// Send a job that uses M3: its beam stays on if the cable is pulled. Stay beside the machine
     #[arg(long)]
     allow_constant_power: bool,
-    /// The S word of full power that the job was made for; the controller's $30 must be the same
+    /// The S word of full power that the job was made for; the controller's $30 must be the same [default: the
+    /// profile's]
     #[arg(long, value_name = "S")]
     s_max: Option<f64>,
+}
+
+/// What GRBL boards use unless they were built otherwise.
+const STANDARD_BAUD: u32 = 115_200;
+
+/// The profile asked for, else the shipped one that the job's header names, else none: G-code of other programs is
+/// sent without a profile to compare with.
+pub(super) fn machine_for(asked: Option<&str>, job: &[u8]) -> Result<Option<Machine>, Failure> {
+    if let Some(name) = asked {
+        return machine::load(name).map(Some).map_err(Failure::bad);
+    }
+    let text = String::from_utf8_lossy(job);
+    let named = gcode::machine_of(&text)
+        .filter(|name| machine::shipped().any(|(shipped, _)| shipped == *name));
+    named
+        .map(|name| machine::load(name).map_err(Failure::bad))
+        .transpose()
 }
 
 /// Sends a job.
@@ -39,14 +62,18 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
             args.job.display()
         ))
     })?;
+    let machine = machine_for(args.machine.as_deref(), &text)?;
     let rules = JobRules {
         allow_constant_power: args.allow_constant_power,
         ..JobRules::default()
     };
+    let s_max = args.s_max.or(machine.as_ref().map(|m| m.laser.s_max));
     let here = |error| Failure::Bad(format!("{}: {error}", args.job.display()));
     if args.port == "sim" {
-        let mut settings = Settings::default();
-        if let Some(s_max) = args.s_max {
+        let mut settings = machine
+            .as_ref()
+            .map_or_else(Settings::default, Settings::of_machine);
+        if let Some(s_max) = s_max {
             settings.s_max = s_max;
         }
         let rehearsal =
@@ -60,12 +87,16 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
     }
     let job = Job::check(&text, &rules).map_err(here)?;
     let options = SendOptions {
-        s_max: args.s_max,
+        s_max,
         ..SendOptions::default()
     };
     // From the opening on: it resets the board, and an exit in between would leave it to itself.
     let guard = terminal.forbid_exit();
-    let mut port = SerialTransport::open(&args.port, args.baud).map_err(Failure::bad)?;
+    let baud = args
+        .baud
+        .or(machine.map(|m| m.connection.baud))
+        .unwrap_or(STANDARD_BAUD);
+    let mut port = SerialTransport::open(&args.port, baud).map_err(Failure::bad)?;
     let result = send(&mut port, &job, &options, terminal);
     drop(guard);
     terminal.clear();

@@ -20,6 +20,9 @@ pub struct SimArgs {
     /// A symbolic link to the pseudo-terminal, under a name that does not change
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
+    /// The machine's profile
+    #[arg(long, value_name = "NAME|FILE", default_value = crate::machine::DEFAULT)]
+    machine: String,
     /// The machine's seconds per second, or `max` for as fast as it is fed
     #[arg(long, default_value = "1", value_parser = speed)]
     speed: Speed,
@@ -48,6 +51,7 @@ fn speed(text: &str) -> Result<Speed, String> {
 
 /// Serves until Ctrl-C, or until the sender leaves.
 pub fn run(args: &SimArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
+    let machine = crate::machine::load(&args.machine).map_err(Failure::bad)?;
     let mut server = PtyServer::open().map_err(Failure::bad)?;
     let _link = match &args.link {
         Some(path) => Some(Link::new(path, server.path()).map_err(Failure::bad)?),
@@ -61,11 +65,11 @@ pub fn run(args: &SimArgs, global: &Global, terminal: &Terminal) -> Result<(), F
     }
     // Programs that wait for the path read from a pipe.
     let _ = std::io::stdout().flush();
-    let mut controller = Controller::new(Settings::default());
+    let mut controller = Controller::new(Settings::of_machine(&machine));
     let how = Serve {
         speed: args.speed.0,
         once: args.once,
-        reset_on_open: !args.no_reset_on_open,
+        reset_on_open: machine.connection.reset_on_open && !args.no_reset_on_open,
     };
     server.run(&mut controller, how, |_| terminal.interrupted());
     // The line is gone, the machine is not: what it had in its buffers still runs, as on a real one.

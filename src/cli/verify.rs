@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::send::machine_for;
 use super::{Failure, Global, Terminal, print, print_json};
 use crate::base::units::short;
 use crate::{gcode, machine, pattern};
@@ -19,9 +20,9 @@ pub struct VerifyArgs {
     /// The sheet that it must cut [default: the pattern.svg beside it]
     #[arg(long, value_name = "SVG")]
     sheet: Option<PathBuf>,
-    /// A shipped machine or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = machine::DEFAULT)]
-    machine: String,
+    /// The machine's profile [default: the one that the job's header names, or the standard one]
+    #[arg(long, value_name = "NAME|FILE")]
+    machine: Option<String>,
     /// How often each cut must be gone over [default: taken from the job, then demanded everywhere]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     passes: Option<u32>,
@@ -40,8 +41,11 @@ fn read(path: &Path) -> Result<String, Failure> {
 /// # Errors
 /// [`Failure::No`] with the findings, [`Failure::Bad`] for files that cannot be used.
 pub fn run(args: &VerifyArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
-    let machine = machine::load(&args.machine).map_err(Failure::bad)?;
     let text = read(&args.job)?;
+    let machine = match machine_for(args.machine.as_deref(), text.as_bytes())? {
+        Some(machine) => machine,
+        None => machine::load(machine::DEFAULT).map_err(Failure::bad)?,
+    };
     let sheet_path = args.sheet.clone().or_else(|| {
         let beside = args.job.with_file_name("pattern.svg");
         beside.is_file().then_some(beside)

@@ -79,6 +79,17 @@ impl Writer {
     }
 }
 
+/// How the header names the machine profile that a job was written for.
+const MACHINE_LINE: &str = "; machine ";
+
+/// The name of the machine profile that a job was written for, from its header; `None` for G-code of other programs.
+pub fn machine_of(text: &str) -> Option<&str> {
+    text.lines()
+        .take(8)
+        .find_map(|line| line.strip_prefix(MACHINE_LINE))
+        .map(str::trim)
+}
+
 /// The G-code of a toolpath, in machine coordinates, ending with a line end.
 ///
 /// The beam: `M4` follows speed and is off on every `G0` and at rest, as long as the controller is in laser mode
@@ -100,7 +111,7 @@ pub fn write(
         power: String::new(),
     };
     w.line(format!("; kagome {}", env!("CARGO_PKG_VERSION")));
-    w.line(format!("; machine {}", machine.name));
+    w.line(format!("{MACHINE_LINE}{}", machine.name));
     w.line(format!("; material {}", material.name));
     w.line(format!(
         "; {} strokes, cut {} mm, travel {} mm",

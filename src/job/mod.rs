@@ -1,7 +1,133 @@
-//! Stage 12: the whole job, and what it tells its maker.
+//! Stage 12: the whole line in one call: from a surface to verified, rehearsed G-code with a report.
 //!
-//! - [`picture`]: a small software renderer: surfaces, layouts and linkages as PNG, colour maps and their legends;
-//! - [`report`]: the page `report.html`: the verdict in words, the pictures, every figure.
+//! A [`Request`] is what a person asks for; [`make()`] takes it through every stage, and a [`Design`] is what was
+//! decided, so that the same sheet can be made again. A [`Verdict`] says whether it may be cut; only then is there a
+//! pattern or a job.
 
+mod cut;
+mod design;
+mod make;
 pub mod picture;
 pub mod report;
+mod request;
+mod verdict;
+
+use std::path::PathBuf;
+
+pub use design::{ConeChoice, Design, LinkageChoice, SheetChoice, SolveChoice, SurfaceChoice};
+pub use make::{FILES, Made, make};
+pub use request::{ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, Request, Source};
+pub use verdict::{COVERAGE_WANTED, EDGE_TOLERANCE, Reason, Verdict};
+
+use crate::base::document::DocumentError;
+use crate::base::progress::Interrupted;
+
+/// Why nothing was made.
+#[derive(Debug, thiserror::Error)]
+pub enum MakeError {
+    /// The mesh file cannot be read.
+    #[error("cannot read {path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The mesh is not the one that the design was made for.
+    #[error(
+        "{path} is not the mesh that this design was made for: its SHA-256 is {found}, the design names {expected}. Put the old mesh back, or delete the line sha256 and look at the result again"
+    )]
+    Changed {
+        /// The file.
+        path: PathBuf,
+        /// In the design.
+        expected: String,
+        /// Of the file.
+        found: String,
+    },
+    /// σ is not a stretch that the pattern can take.
+    #[error(
+        "σ = {sigma} is not possible: the pattern stretches by more than 1 (closed) and at most 2 (fully open); most sheets take 1.2 to 1.8"
+    )]
+    Sigma {
+        /// As given.
+        sigma: f64,
+    },
+    /// A size that is none.
+    #[error("{what} is {value}, it must be positive: for example {example}")]
+    Size {
+        /// What it is the size of.
+        what: &'static str,
+        /// As given.
+        value: f64,
+        /// What could be given.
+        example: &'static str,
+    },
+    /// A cone at a vertex that does not exist.
+    #[error("--cone v{vertex}: there is no such vertex, the surface has v1 to v{count}")]
+    NoSuchVertex {
+        /// As given.
+        vertex: u64,
+        /// Vertices there are.
+        count: usize,
+    },
+    /// A cone at a point far from the surface.
+    #[error(
+        "--cone {},{},{}: the surface is {distance_mm:.1} mm away from there; coordinates are millimetres after --unit, --scale and --size (see `kagome inspect`)",
+        at[0], at[1], at[2]
+    )]
+    ConeFarAway {
+        /// As given.
+        at: [f64; 3],
+        /// Distance from the surface.
+        distance_mm: f64,
+    },
+    /// The mesh file is no surface.
+    #[error(transparent)]
+    Import(crate::mesh::ImportError),
+    /// The sample cannot be made.
+    #[error(transparent)]
+    Sample(crate::mesh::SampleError),
+    /// A cone could not be placed.
+    #[error(transparent)]
+    Edit(crate::mesh::edit::EditError),
+    /// The material profile cannot be used.
+    #[error(transparent)]
+    Material(crate::material::MaterialError),
+    /// The machine profile cannot be used.
+    #[error(transparent)]
+    Machine(crate::machine::MachineError),
+    /// The machine cannot cut the material.
+    #[error(transparent)]
+    Cut(crate::material::CutError),
+    /// The design file cannot be used.
+    #[error(transparent)]
+    Design(DocumentError),
+    /// No conformal map.
+    #[error(transparent)]
+    Conformal(crate::conformal::ConformalError),
+    /// No linkage.
+    #[error(transparent)]
+    Linkage(crate::linkage::LinkageError),
+    /// No solution at all.
+    #[error(transparent)]
+    Rationalize(crate::rationalize::RationalizeError),
+    /// No sheet, or none that fits the bed.
+    #[error(transparent)]
+    Pattern(crate::pattern::PatternError),
+    /// No toolpath.
+    #[error(transparent)]
+    Toolpath(crate::toolpath::ToolpathError),
+    /// No G-code.
+    #[error(transparent)]
+    Gcode(crate::gcode::GcodeError),
+    /// The rehearsal did not come to its end.
+    #[error(transparent)]
+    Rehearsal(crate::sim::RehearsalError),
+    /// The person asked to stop.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+    /// A fault of this program.
+    #[error("internal fault: {0}; please report it with the design file")]
+    Internal(String),
+}

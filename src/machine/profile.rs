@@ -210,6 +210,11 @@ impl Machine {
         }
     }
 
+    /// Where the head waits before and after a job, millimetres.
+    pub fn park_mm(&self) -> [f64; 2] {
+        [self.job.park.x_mm, self.job.park.y_mm]
+    }
+
     /// All checks, in the order of the file.
     ///
     /// # Errors

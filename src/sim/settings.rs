@@ -1,5 +1,6 @@
 //! The numbers a GRBL controller keeps in its memory, `$0` to `$132`.
 
+use crate::machine::Machine;
 use crate::planner::Limits;
 
 /// Settings of the simulated controller, with the defaults of GRBL 1.1's generic machine except where a laser needs
@@ -95,6 +96,35 @@ impl Settings {
             travel_mm,
             s_max,
             ..Self::default()
+        }
+    }
+
+    /// The controller of a machine profile, as a well-configured one would be.
+    pub fn of_machine(machine: &Machine) -> Self {
+        let standard = Self::default();
+        let (rate, acceleration) = (
+            machine.motion.rate_mm_per_min,
+            machine.motion.acceleration_mm_per_s2,
+        );
+        let limits = Limits {
+            max_rate_mm_min: [rate.x, rate.y, standard.max_rate_mm_min[2]],
+            acceleration_mm_s2: [
+                acceleration.x,
+                acceleration.y,
+                standard.acceleration_mm_s2[2],
+            ],
+            junction_deviation_mm: machine.motion.junction_deviation_mm,
+        };
+        let travel_mm = [
+            machine.bed.width_mm,
+            machine.bed.height_mm,
+            standard.travel_mm[2],
+        ];
+        Self {
+            receive_buffer: machine.connection.receive_buffer_bytes as usize,
+            planner_blocks: machine.connection.planner_blocks as usize,
+            baud: Some(f64::from(machine.connection.baud)),
+            ..Self::laser(&limits, travel_mm, machine.laser.s_max)
         }
     }
 

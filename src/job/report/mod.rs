@@ -19,37 +19,14 @@ pub use histogram::histogram;
 pub use strokes::{Role, Stroke};
 pub use text::{escape, svg_element};
 
+use super::Verdict;
+use super::picture::{ColourScale, Scene, View, legend};
 use crate::base::ids::Per;
 use crate::base::units::short;
 use crate::conformal::Layout;
-use crate::job::picture::{ColourScale, Scene, View, legend};
 use crate::linkage::Linkage;
 use crate::mesh::{Surface, VertexId};
 use views::{Named, Style};
-
-/// One thing that decided the verdict.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Reason {
-    /// In words, with the measured value.
-    pub text: String,
-    /// Where it is on the surface, millimetres: a numbered ring on the pictures.
-    pub at_mm: Option<Point3<f64>>,
-}
-
-impl From<String> for Reason {
-    fn from(text: String) -> Self {
-        Self { text, at_mm: None }
-    }
-}
-
-/// Whether the job may be cut.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Verdict {
-    /// True if everything is within its limit.
-    pub pass: bool,
-    /// Why not; or what was checked.
-    pub reasons: Vec<Reason>,
-}
 
 /// All that the page shows.
 #[derive(Clone, Copy, Debug)]
@@ -111,7 +88,7 @@ pub fn html(page: &Page<'_>) -> String {
         .reasons
         .iter()
         .enumerate()
-        .filter_map(|(i, r)| r.at_mm.map(|p| (i + 1, p)))
+        .filter_map(|(i, r)| r.at_mm.map(|p| (i + 1, Point3::from(p))))
         .collect();
     stretch(&mut out, page, &places);
     linkage(&mut out, page, &places);

@@ -4,6 +4,7 @@ use nalgebra::Point2;
 
 use super::*;
 use crate::conformal::{ConeRequest, FlattenOptions, Sizing, flatten};
+use crate::job::Reason;
 use crate::linkage::{Handedness, LinkageOptions, build};
 
 /// A shallow dish of 2 · n² faces: a real layout and a real linkage, small enough for a test.
@@ -58,7 +59,7 @@ fn with_page<T>(full: bool, then: impl FnOnce(&Page<'_>) -> T) -> T {
         pass: full,
         reasons: vec![Reason {
             text: "the <tip> is 1.89 L away".into(),
-            at_mm: (!full).then(Point3::origin),
+            at_mm: (!full).then_some([0.0; 3]),
         }],
     };
     let strokes = [Stroke {

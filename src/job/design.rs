@@ -1,0 +1,256 @@
+//! `design.toml`: every decision that a sheet depends on, so that it can be made again, byte for byte, or changed by
+//! hand.
+//!
+//! `kagome make` decides what was left open (the cone, the edge length, hinge and kerf from the material) and writes
+//! down what it decided. Nothing here depends on the day or the machine that ran it.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::MakeError;
+use super::request::{ConePlace, ConeWish, Request, Source};
+use crate::base::document::{Complaint, Document, ranged};
+use crate::conformal::Sizing;
+use crate::linkage::Handedness;
+use crate::mesh::{ImportOptions, PartChoice, Unit, Units};
+use crate::rationalize::Solver;
+
+/// The version of the format that this program writes and reads.
+pub const FORMAT: u32 = 1;
+
+/// A design file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Design {
+    /// Version of this format.
+    pub format: u32,
+    /// Where the surface comes from.
+    pub surface: SurfaceChoice,
+    /// What it is cut from, and with what.
+    pub sheet: SheetChoice,
+    /// How the lattice lies on it.
+    pub linkage: LinkageChoice,
+    /// How it is solved and judged.
+    pub solve: SolveChoice,
+    /// The cones; none if the list is absent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cone: Vec<ConeChoice>,
+}
+
+/// `[surface]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SurfaceChoice {
+    /// A mesh file, relative to the design file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// A sample with its parameters, in place of a file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sample: Option<String>,
+    /// SHA-256 of the mesh file: a changed mesh is not silently cut with an old design.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sha256: Option<String>,
+    /// Millimetres per unit of the file.
+    pub mm_per_unit: f64,
+    /// True if only the largest of several parts is used.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub largest_part: bool,
+}
+
+/// `[sheet]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SheetChoice {
+    /// Name or file of the material profile.
+    pub material: String,
+    /// Name or file of the machine profile.
+    pub machine: String,
+    /// Largest scale factor.
+    pub sigma: f64,
+    /// Width of the ligaments, millimetres.
+    pub hinge_width_mm: f64,
+    /// Width of the cut, millimetres.
+    pub kerf_mm: f64,
+    /// True if the beam strikes the back.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub mirror: bool,
+}
+
+/// `[linkage]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LinkageChoice {
+    /// Triangle edge L, millimetres.
+    pub edge_mm: f64,
+    /// Lattice direction against the layout's X, degrees.
+    pub orientation_deg: f64,
+    /// Which of the two slit patterns.
+    pub pattern: Handedness,
+    /// Triangles dropped at the cone.
+    pub remove_at_cone: usize,
+}
+
+/// `[solve]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolveChoice {
+    /// Which solver.
+    pub solver: Solver,
+    /// Distance from the surface that passes, in L.
+    pub accept_distance: f64,
+}
+
+/// `[[cone]]`: at a vertex of the mesh or at a point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConeChoice {
+    /// Vertex of the imported surface, counted from 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vertex: Option<u64>,
+    /// Point in millimetres; the nearest point of the surface is taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_mm: Option<[f64; 3]>,
+    /// Curvature in units of 2π/3.
+    pub units: i32,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde calls it with a reference"
+)]
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+impl Design {
+    /// Reads a design file's text; `name` is what messages call it.
+    ///
+    /// # Errors
+    /// [`MakeError::Design`] with file, line and key.
+    pub fn parse(name: &str, text: &str) -> Result<Self, MakeError> {
+        Document::new(name, text)
+            .read(Self::validate)
+            .map_err(MakeError::Design)
+    }
+
+    /// The file's text.
+    ///
+    /// # Errors
+    /// None in practice: every value has a TOML form. A failure is passed on rather than hidden.
+    pub fn to_text(&self) -> Result<String, MakeError> {
+        let body =
+            toml::to_string(self).map_err(|e| MakeError::Internal(format!("design.toml: {e}")))?;
+        Ok(format!(
+            "# Every decision of this sheet. `kagome make design.toml -o OTHER` makes it again.\n{body}"
+        ))
+    }
+
+    fn validate(&self) -> Result<(), Complaint> {
+        if self.format != FORMAT {
+            return Err(Complaint::new(
+                "format",
+                format!("is {}; this kagome reads format {FORMAT}", self.format),
+            ));
+        }
+        match (&self.surface.file, &self.surface.sample) {
+            (Some(_), None) | (None, Some(_)) => {}
+            _ => {
+                return Err(Complaint::new(
+                    "surface",
+                    "needs exactly one of file and sample",
+                ));
+            }
+        }
+        ranged("surface.mm_per_unit", self.surface.mm_per_unit, 1e-9, 1e9)?;
+        ranged(
+            "sheet.hinge_width_mm",
+            self.sheet.hinge_width_mm,
+            0.01,
+            100.0,
+        )?;
+        ranged("sheet.kerf_mm", self.sheet.kerf_mm, 0.0, 20.0)?;
+        ranged("linkage.edge_mm", self.linkage.edge_mm, 0.01, 1e5)?;
+        ranged(
+            "linkage.orientation_deg",
+            self.linkage.orientation_deg,
+            -360.0,
+            360.0,
+        )?;
+        ranged(
+            "solve.accept_distance",
+            self.solve.accept_distance,
+            0.0,
+            100.0,
+        )?;
+        for (i, cone) in self.cone.iter().enumerate() {
+            if cone.vertex.is_some() == cone.at_mm.is_some() {
+                return Err(Complaint::new(
+                    format!("cone[{i}]"),
+                    "needs exactly one of vertex and at_mm",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// What to make; file names are taken relative to `folder`, where the design file lies.
+    pub fn request(&self, folder: &Path) -> Request {
+        let beside = |name: &str| -> PathBuf { folder.join(name) };
+        // A profile is a name or a file beside the design.
+        let profile = |name: &str| -> String {
+            let path = beside(name);
+            if path.is_file() {
+                path.to_string_lossy().into_owned()
+            } else {
+                name.to_owned()
+            }
+        };
+        let source = match (&self.surface.file, &self.surface.sample) {
+            (Some(file), _) => Source::File {
+                path: beside(file),
+                sha256: self.surface.sha256.clone(),
+            },
+            (None, sample) => Source::Sample(sample.clone().unwrap_or_default()),
+        };
+        let cones = self
+            .cone
+            .iter()
+            .map(|c| {
+                let place = match (c.at_mm, c.vertex) {
+                    (Some(at), _) => ConePlace::Point(at),
+                    (None, vertex) => ConePlace::Vertex(vertex.unwrap_or(0)),
+                };
+                (place, c.units)
+            })
+            .collect();
+        Request {
+            source,
+            import: ImportOptions {
+                units: Units {
+                    unit: Unit::Millimetre,
+                    scale: self.surface.mm_per_unit,
+                    size_mm: None,
+                },
+                parts: if self.surface.largest_part {
+                    PartChoice::Largest
+                } else {
+                    PartChoice::Refuse
+                },
+            },
+            material: profile(&self.sheet.material),
+            machine: profile(&self.sheet.machine),
+            sigma: Some(self.sheet.sigma),
+            hinge_width_mm: Some(self.sheet.hinge_width_mm),
+            kerf_mm: Some(self.sheet.kerf_mm),
+            mirror: self.sheet.mirror,
+            sizing: Sizing::EdgeMm(self.linkage.edge_mm),
+            cones: ConeWish::Given(cones),
+            orientation_deg: self.linkage.orientation_deg,
+            handedness: self.linkage.pattern,
+            remove_at_cone: Some(self.linkage.remove_at_cone),
+            solver: self.solve.solver,
+            accept_distance: self.solve.accept_distance,
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! What a person asks `make` for: decisions taken, and those left to the program.
+
+use std::path::PathBuf;
+
+use crate::conformal::Sizing;
+use crate::linkage::Handedness;
+use crate::mesh::ImportOptions;
+use crate::rationalize::Solver;
+
+/// Where the surface comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// A mesh file.
+    File {
+        /// Its path.
+        path: PathBuf,
+        /// The SHA-256 (hexadecimal) that it must have, if it is known.
+        sha256: Option<String>,
+    },
+    /// A sample with its parameters, `NAME:key=value,…`.
+    Sample(String),
+}
+
+/// Where a cone is wanted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ConePlace {
+    /// At a vertex, counted from 1.
+    Vertex(u64),
+    /// At the point of the surface nearest to this one, millimetres.
+    Point([f64; 3]),
+}
+
+/// Which cones are wanted.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum ConeWish {
+    /// As many as needed (so far: none or one).
+    #[default]
+    Auto,
+    /// Exactly these, with their curvature in units of 2π/3.
+    Given(Vec<(ConePlace, i32)>),
+}
+
+/// Everything that `make` needs.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// The surface.
+    pub source: Source,
+    /// Its units, and which part of it.
+    pub import: ImportOptions,
+    /// Material profile: a shipped name or a file.
+    pub material: String,
+    /// Machine profile: a shipped name or a file.
+    pub machine: String,
+    /// Largest scale factor, in place of the material's.
+    pub sigma: Option<f64>,
+    /// Ligament width in millimetres, in place of the material's.
+    pub hinge_width_mm: Option<f64>,
+    /// Width of the cut in millimetres, in place of the material's.
+    pub kerf_mm: Option<f64>,
+    /// Cut from the back.
+    pub mirror: bool,
+    /// Triangle size.
+    pub sizing: Sizing,
+    /// Cones.
+    pub cones: ConeWish,
+    /// Lattice direction, degrees.
+    pub orientation_deg: f64,
+    /// Slit pattern.
+    pub handedness: Handedness,
+    /// Triangles to drop at the cone; `None`: at a positive cone 4, or 16 where λ asks for it.
+    pub remove_at_cone: Option<usize>,
+    /// Solver.
+    pub solver: Solver,
+    /// Distance from the surface that passes, in L.
+    pub accept_distance: f64,
+}
+
+/// Distance from the surface that passes unless told otherwise, in L.
+pub const ACCEPT_DISTANCE: f64 = 0.1;
+
+impl Request {
+    /// A request with every decision left to the program but the surface.
+    pub fn new(source: Source) -> Self {
+        Self {
+            source,
+            import: ImportOptions::default(),
+            material: crate::material::DEFAULT.into(),
+            machine: crate::machine::DEFAULT.into(),
+            sigma: None,
+            hinge_width_mm: None,
+            kerf_mm: None,
+            mirror: false,
+            sizing: Sizing::Triangles(DEFAULT_TRIANGLES),
+            cones: ConeWish::Auto,
+            orientation_deg: 0.0,
+            handedness: Handedness::Right,
+            remove_at_cone: None,
+            solver: Solver::Exact,
+            accept_distance: ACCEPT_DISTANCE,
+        }
+    }
+}
+
+/// Number of triangles unless a size is given: fine enough for a face, coarse enough for a first job.
+pub const DEFAULT_TRIANGLES: f64 = 1500.0;

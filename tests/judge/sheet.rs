@@ -1,0 +1,301 @@
+//! Judges a job against its drawing, from the two file formats alone: `pattern.svg` says what is wanted (slits as
+//! centre lines, contours as the edge that remains, the kerf as an attribute), `job.nc` or a machine's record says
+//! what is burnt. By sampling, so that nothing is shared with the program's interval arithmetic.
+
+use std::collections::HashMap;
+
+type P = [f64; 2];
+
+/// What is wanted.
+pub struct Drawing {
+    pub slits: Vec<[P; 2]>,
+    pub contours: Vec<Vec<P>>,
+    pub triangles: Vec<Vec<P>>,
+    pub kerf: f64,
+    pub hinge: f64,
+    pub edge: f64,
+}
+
+fn attribute(text: &str, name: &str) -> Option<String> {
+    let at = text.find(&format!("{name}=\""))? + name.len() + 2;
+    Some(text[at..].split('"').next()?.to_owned())
+}
+
+/// Points of a path of M, L and Z with absolute coordinates; Y up.
+fn points(d: &str) -> Vec<P> {
+    d.split_whitespace()
+        .filter(|w| *w != "Z")
+        .map(|w| {
+            let (x, y) = w
+                .trim_start_matches(['M', 'L'])
+                .split_once(',')
+                .expect("x,y");
+            [x.parse().expect("x"), -y.parse::<f64>().expect("y")]
+        })
+        .collect()
+}
+
+pub fn read_drawing(svg: &str) -> Drawing {
+    let number = |name: &str| {
+        attribute(svg, name)
+            .expect(name)
+            .parse::<f64>()
+            .expect(name)
+    };
+    let group = |id: &str| -> Vec<Vec<P>> {
+        let start = svg
+            .find(&format!("id=\"{id}\""))
+            .unwrap_or_else(|| panic!("group {id}"));
+        let body = svg[start..].split("</g>").next().expect("the group's end");
+        body.match_indices("<path")
+            .map(|(i, _)| points(&attribute(&body[i..], " d").expect("d")))
+            .collect()
+    };
+    Drawing {
+        slits: group("slits").into_iter().map(|p| [p[0], p[1]]).collect(),
+        contours: group("contour"),
+        triangles: group("guide"),
+        kerf: number("data-kagome-kerf-mm"),
+        hinge: number("data-kagome-hinge-width-mm"),
+        edge: number("data-kagome-edge-mm"),
+    }
+}
+
+/// A straight piece that a program burns, and what the program does with the beam off.
+pub struct Burnt {
+    pub pieces: Vec<[P; 2]>,
+    pub faults: Vec<String>,
+}
+
+/// Runs the few words that a laser job needs: G0/G1 modal, X, Y, F, S, M3/M4/M5, G20/G21, G90/G91, M2.
+pub fn burn(gcode: &str) -> Burnt {
+    let (mut at, mut motion, mut beam, mut power, mut feed) = ([0.0, 0.0], None, false, 0.0, 0.0);
+    let (mut mm, mut absolute, mut ended) = (false, false, false);
+    let mut out = Burnt {
+        pieces: vec![],
+        faults: vec![],
+    };
+    for (n, raw) in gcode.lines().enumerate() {
+        let line = raw.split(';').next().unwrap_or("").trim();
+        if line.len() > 79 {
+            out.faults.push(format!("line {} is too long", n + 1));
+        }
+        let (mut to, mut moves) = (at, false);
+        for word in line.split_whitespace() {
+            let value: f64 = word[1..]
+                .parse()
+                .unwrap_or_else(|_| panic!("line {}: {word}", n + 1));
+            match (&word[..1], value as i64) {
+                ("G", 0 | 1) => motion = Some(value as i64),
+                ("G", 20) => out.faults.push("inches".into()),
+                ("G", 21) => mm = true,
+                ("G", 90) => absolute = true,
+                ("G", 91) => out.faults.push("incremental".into()),
+                ("M", 3) => out.faults.push(format!("line {}: constant power", n + 1)),
+                ("M", 4) => beam = true,
+                ("M", 5) => beam = false,
+                ("M", 2 | 30) => ended = true,
+                ("X", _) => (to[0], moves) = (value, true),
+                ("Y", _) => (to[1], moves) = (value, true),
+                ("F", _) => feed = value,
+                ("S", _) => power = value,
+                _ => {}
+            }
+        }
+        if !moves {
+            continue;
+        }
+        if !mm || !absolute || ended {
+            out.faults
+                .push(format!("line {}: a move outside G21 G90 … M2", n + 1));
+        }
+        if motion == Some(1) {
+            if feed <= 0.0 {
+                out.faults.push(format!("line {}: no feed", n + 1));
+            }
+            if beam && power > 0.0 {
+                out.pieces.push([at, to]);
+            }
+        }
+        at = to;
+    }
+    if beam || !ended {
+        out.faults
+            .push("the program ends with the beam on, or not at all".into());
+    }
+    out
+}
+
+fn distance(p: P, s: &[P; 2]) -> f64 {
+    let d = [s[1][0] - s[0][0], s[1][1] - s[0][1]];
+    let q = [p[0] - s[0][0], p[1] - s[0][1]];
+    let l = d[0] * d[0] + d[1] * d[1];
+    let t = if l > 0.0 {
+        ((q[0] * d[0] + q[1] * d[1]) / l).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    (q[0] - t * d[0]).hypot(q[1] - t * d[1])
+}
+
+/// Pieces by the cells that they pass.
+struct Map<'a> {
+    pieces: &'a [[P; 2]],
+    cells: HashMap<[i64; 2], Vec<usize>>,
+}
+const CELL: f64 = 2.0;
+
+impl<'a> Map<'a> {
+    fn new(pieces: &'a [[P; 2]]) -> Self {
+        let mut cells: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
+        for (i, s) in pieces.iter().enumerate() {
+            let steps = ((s[1][0] - s[0][0]).hypot(s[1][1] - s[0][1]) / (0.5 * CELL)).ceil() as i64;
+            for k in 0..=steps.max(1) {
+                let t = k as f64 / steps.max(1) as f64;
+                let p = [0, 1].map(|c| ((s[0][c] + t * (s[1][c] - s[0][c])) / CELL).floor() as i64);
+                let list = cells.entry(p).or_default();
+                if list.last() != Some(&i) {
+                    list.push(i);
+                }
+            }
+        }
+        Self { pieces, cells }
+    }
+    fn nearest(&self, p: P) -> f64 {
+        let c = [0, 1].map(|k: usize| (p[k] / CELL).floor() as i64);
+        let mut best = f64::INFINITY;
+        for i in -1..=1 {
+            for j in -1..=1 {
+                for &s in self.cells.get(&[c[0] + i, c[1] + j]).into_iter().flatten() {
+                    best = best.min(distance(p, &self.pieces[s]));
+                }
+            }
+        }
+        best
+    }
+}
+
+fn samples(s: &[P; 2], step: f64) -> impl Iterator<Item = P> + '_ {
+    let n = ((s[1][0] - s[0][0]).hypot(s[1][1] - s[0][1]) / step)
+        .ceil()
+        .max(1.0) as usize;
+    (0..=n).map(move |i| [0, 1].map(|k| s[0][k] + (s[1][k] - s[0][k]) * i as f64 / n as f64))
+}
+
+/// True if p lies inside the closed loops (even-odd).
+fn inside(p: P, loops: &[Vec<P>]) -> bool {
+    let mut odd = false;
+    for l in loops {
+        for i in 0..l.len() {
+            let (a, b) = (l[i], l[(i + 1) % l.len()]);
+            if (a[1] > p[1]) != (b[1] > p[1])
+                && p[0] < a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+            {
+                odd = !odd;
+            }
+        }
+    }
+    odd
+}
+
+/// Compares what is burnt with what is drawn. `tolerance` sideways; `end_gap` may be missing at the ends of a stroke.
+pub fn compare(drawing: &Drawing, burnt: &[[P; 2]], tolerance: f64, end_gap: f64) -> Vec<String> {
+    let mut faults = vec![];
+    let k = drawing.kerf;
+    let burnt_map = Map::new(burnt);
+    let rim: Vec<[P; 2]> = drawing
+        .contours
+        .iter()
+        .flat_map(|l| (0..l.len()).map(|i| [l[i], l[(i + 1) % l.len()]]))
+        .collect();
+    let (slit_map, rim_map) = (Map::new(&drawing.slits), Map::new(&rim));
+
+    // Every slit is burnt from end to end.
+    for s in &drawing.slits {
+        let length = (s[1][0] - s[0][0]).hypot(s[1][1] - s[0][1]);
+        for p in samples(s, 0.1) {
+            let to_end = [s[0], s[1]].map(|e| (p[0] - e[0]).hypot(p[1] - e[1]));
+            if to_end[0].min(to_end[1]) >= end_gap && burnt_map.nearest(p) > tolerance {
+                faults.push(format!(
+                    "the slit from {:.3?} ({length:.2} mm) is not burnt at {p:.3?}",
+                    s[0]
+                ));
+                break;
+            }
+        }
+    }
+    // Every contour has a cut half a kerf outside: within k of a corner of 60°, within k/2 elsewhere.
+    for s in &rim {
+        let e = [s[1][0] - s[0][0], s[1][1] - s[0][1]];
+        let l = e[0].hypot(e[1]);
+        for p in samples(s, 0.2) {
+            let out = [p[0] + 0.5 * k * e[1] / l, p[1] - 0.5 * k * e[0] / l];
+            let to_end = (p[0] - s[0][0])
+                .hypot(p[1] - s[0][1])
+                .min((p[0] - s[1][0]).hypot(p[1] - s[1][1]));
+            // At a corner that bends inwards the path turns before it gets there.
+            if to_end > 2.0 * k + end_gap && burnt_map.nearest(out) > tolerance {
+                faults.push(format!("the contour is not cut at {p:.3?}"));
+                break;
+            }
+        }
+    }
+    // Nothing else is burnt: each burnt point is on a slit, or half a kerf outside a contour.
+    for s in burnt {
+        for p in samples(s, 0.1) {
+            let on_slit = slit_map.nearest(p) <= tolerance;
+            let beside =
+                (rim_map.nearest(p) - 0.5 * k).abs() <= tolerance && !inside(p, &drawing.contours);
+            if !on_slit && !beside {
+                faults.push(format!(
+                    "burnt at {p:.3?}: {:.3} mm from a slit, {:.3} mm from the contour",
+                    slit_map.nearest(p),
+                    rim_map.nearest(p)
+                ));
+                break;
+            }
+        }
+    }
+    // Nothing is burnt twice, by length.
+    let length = |list: &[[P; 2]]| {
+        list.iter()
+            .map(|s| (s[1][0] - s[0][0]).hypot(s[1][1] - s[0][1]))
+            .sum::<f64>()
+    };
+    let wanted = length(&drawing.slits) + length(&rim) + 8.0 * k * drawing.contours.len() as f64;
+    if length(burnt) > wanted + 0.01 * length(&rim) + 1.0 {
+        faults.push(format!(
+            "{:.1} mm burnt, {wanted:.1} mm wanted",
+            length(burnt)
+        ));
+    }
+    faults
+}
+
+/// The narrowest ligament: the least distance between a slit's tip and another cut, less the kerf.
+pub fn narrowest_ligament(drawing: &Drawing) -> f64 {
+    let mut least = f64::INFINITY;
+    for (i, s) in drawing.slits.iter().enumerate() {
+        for (j, other) in drawing.slits.iter().enumerate() {
+            // Arms of the lattice vertex ahead start near the tip, all others are far.
+            if i != j && distance(s[1], other) < 2.0 * drawing.edge {
+                least = least.min(distance(s[1], other) - drawing.kerf);
+            }
+        }
+    }
+    least
+}
+
+/// Area of the sheet by its contours, mm².
+pub fn area(drawing: &Drawing) -> f64 {
+    let loops = &drawing.contours;
+    loops
+        .iter()
+        .map(|l| {
+            (0..l.len())
+                .map(|i| l[i][0] * l[(i + 1) % l.len()][1] - l[i][1] * l[(i + 1) % l.len()][0])
+                .sum::<f64>()
+                / 2.0
+        })
+        .sum()
+}

@@ -1,0 +1,381 @@
+//! `kagome make` as a person runs it, judged from the files that it leaves.
+
+mod judge;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use judge::{linkage, sheet};
+
+const ALL: [&str; 7] = [
+    "design.toml",
+    "layout.obj",
+    "linkage.obj",
+    "pattern.svg",
+    "job.nc",
+    "report.json",
+    "report.html",
+];
+
+fn kagome(args: &[&str], folder: &Path) -> Output {
+    // The slow checks run the release build.
+    let program =
+        std::env::var("KAGOME_BIN").unwrap_or_else(|_| env!("CARGO_BIN_EXE_kagome").into());
+    Command::new(program)
+        .args(args)
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+fn read(path: PathBuf) -> String {
+    std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Makes, and lets both judges look at the result.
+fn make_and_judge(args: &[&str]) -> (sheet::Drawing, linkage::Findings) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut all = vec!["make", "--quiet", "-o", "out"];
+    all.extend(args);
+    let output = kagome(&all, folder.path());
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{args:?}: {}",
+        stderr(&output)
+    );
+    let out = folder.path().join("out");
+    for name in ALL {
+        assert!(out.join(name).is_file(), "{name}");
+    }
+    let sigma = 2.0;
+    let found = linkage::judge(
+        &read(out.join("linkage.obj")),
+        &read(out.join("layout.obj")),
+        sigma,
+    );
+    linkage::strict(&found).unwrap_or_else(|e| panic!("{args:?}: {e}"));
+    let drawing = sheet::read_drawing(&read(out.join("pattern.svg")));
+    let burnt = sheet::burn(&read(out.join("job.nc")));
+    assert_eq!(burnt.faults, Vec::<String>::new());
+    assert_eq!(
+        sheet::compare(&drawing, &burnt.pieces, 0.011, 0.0),
+        Vec::<String>::new()
+    );
+    // The drawing against the linkage: one slit a hinge that is not on a seam, one area a triangle.
+    assert_eq!(drawing.slits.len(), found.hinges - found.seam_hinges);
+    let triangle = 0.75f64.sqrt() / 2.0 * drawing.edge * drawing.edge;
+    let relative = sheet::area(&drawing) / (found.triangles as f64 * triangle) - 1.0;
+    assert!(relative.abs() < 1e-4, "area off by {relative:e}");
+    assert!((sheet::narrowest_ligament(&drawing) - drawing.hinge).abs() < 1e-3);
+    (drawing, found)
+}
+
+#[test]
+fn surfaces_within_reach_become_jobs() {
+    for args in [
+        vec!["sample:hemisphere"],
+        vec!["sample:cap", "--pattern", "left"],
+        vec!["sample:saddle", "--orientation", "17"],
+        vec!["sample:bump", "--cone", "auto", "--remove", "4"],
+    ] {
+        let mut args = args;
+        args.extend(["--sigma", "2", "--triangles", "400"]);
+        let (_, found) = make_and_judge(&args);
+        assert!(
+            (360..=440).contains(&found.triangles),
+            "{} triangles for 400 wanted",
+            found.triangles
+        );
+        assert_eq!(found.seam_hinges > 0, args[0] == "sample:bump");
+    }
+}
+
+/// At the size that a maker uses; minutes without optimisation, so only where the release build is at hand.
+#[test]
+#[ignore = "slow: .ci/run runs it on the release build"]
+fn surfaces_within_reach_become_jobs_at_full_size() {
+    for args in [
+        vec!["sample:hemisphere"],
+        vec!["sample:cap"],
+        vec!["sample:saddle"],
+        vec!["sample:bump", "--cone", "auto", "--remove", "4"],
+        vec!["sample:mask", "--pattern", "left"],
+    ] {
+        let mut args = args;
+        args.extend(["--sigma", "2", "--triangles", "1500"]);
+        let (_, found) = make_and_judge(&args);
+        assert!(
+            (1400..=1600).contains(&found.triangles),
+            "{} triangles for 1500 wanted",
+            found.triangles
+        );
+    }
+}
+
+/// Scans, where a folder of them is named.
+#[test]
+#[ignore = "slow: .ci/run runs it on the release build"]
+fn scans_become_jobs() {
+    let Some(folder) = std::env::var_os("KAGOME_MODELS") else {
+        return;
+    };
+    let mask = Path::new(&folder).join("mp_mask_20k.obj");
+    if mask.is_file() {
+        let path = mask.to_string_lossy().into_owned();
+        let (_, found) = make_and_judge(&[
+            &path,
+            "--cone",
+            "auto",
+            "--remove",
+            "4",
+            "--triangles",
+            "1500",
+            "--sigma",
+            "2",
+        ]);
+        assert!(found.distance < 0.1);
+    }
+}
+
+#[test]
+fn cut_from_the_back_is_the_mirror_image() {
+    let plain = make_and_judge(&["sample:cap", "--triangles", "150"]).0;
+    let mirrored = make_and_judge(&["sample:cap", "--triangles", "150", "--mirror"]).0;
+    let width = |d: &sheet::Drawing| {
+        let x = d.contours.iter().flatten().map(|p| p[0]);
+        x.clone().fold(f64::NEG_INFINITY, f64::max) - x.fold(f64::INFINITY, f64::min)
+    };
+    assert!((width(&plain) - width(&mirrored)).abs() < 1e-3);
+    // Mirrored in X about the middle of the sheet.
+    let middle = |d: &sheet::Drawing| {
+        d.contours
+            .iter()
+            .flatten()
+            .map(|p| p[0])
+            .fold(f64::INFINITY, f64::min)
+            + 0.5 * width(d)
+    };
+    let (a, b) = (middle(&plain), middle(&mirrored));
+    for s in &plain.slits {
+        let image = s.map(|p| [b - (p[0] - a), p[1]]);
+        let near = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]) < 1e-3;
+        assert!(
+            mirrored
+                .slits
+                .iter()
+                .any(|t| near(t[0], image[0]) && near(t[1], image[1])),
+            "{s:?}"
+        );
+    }
+}
+
+#[test]
+fn the_design_file_makes_the_same_bytes_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let output = kagome(args, folder.path());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    };
+    run(&["samples", "write", "bump", "-o", "bump.obj"]);
+    run(&[
+        "make",
+        "bump.obj",
+        "-q",
+        "-o",
+        "a",
+        "--triangles",
+        "300",
+        "--orientation",
+        "12.5",
+        "--remove",
+        "4",
+    ]);
+    run(&[
+        "make",
+        "bump.obj",
+        "-q",
+        "-o",
+        "b",
+        "--triangles",
+        "300",
+        "--orientation",
+        "12.5",
+        "--remove",
+        "4",
+    ]);
+    run(&["make", "a/design.toml", "-q", "-o", "c"]);
+    for name in ALL {
+        let [a, b, c] = ["a", "b", "c"].map(|d| read(folder.path().join(d).join(name)));
+        assert!(a == b, "{name} differs between two runs");
+        assert!(a == c, "{name} differs when made from the design");
+    }
+    // Made again in place, when asked.
+    let again = kagome(&["make", "a/design.toml", "-q"], folder.path());
+    assert_eq!(
+        again.status.code(),
+        Some(2),
+        "an earlier result is not replaced unasked"
+    );
+    run(&["make", "a/design.toml", "-q", "--force"]);
+    // A mesh that has changed since is noticed.
+    let mesh = read(folder.path().join("bump.obj")).replacen("v ", "v  ", 1);
+    std::fs::write(folder.path().join("bump.obj"), mesh).unwrap();
+    let changed = kagome(&["make", "a/design.toml", "-q", "-o", "d"], folder.path());
+    assert_eq!(changed.status.code(), Some(2));
+    assert!(stderr(&changed).contains("SHA-256"), "{}", stderr(&changed));
+}
+
+#[test]
+fn a_bump_without_its_cone_gets_a_report_but_no_job() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = kagome(
+        &[
+            "make",
+            "sample:bump",
+            "-q",
+            "-o",
+            "out",
+            "--cone",
+            "none",
+            "--sigma",
+            "2",
+            "--triangles",
+            "500",
+        ],
+        folder.path(),
+    );
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    let words = stderr(&output);
+    assert!(
+        words.contains("misses the surface")
+            && words.contains("mm at (")
+            && words.contains("--cone"),
+        "{words}"
+    );
+    let out = folder.path().join("out");
+    for name in [
+        "design.toml",
+        "layout.obj",
+        "linkage.obj",
+        "report.json",
+        "report.html",
+    ] {
+        assert!(out.join(name).is_file(), "{name}");
+    }
+    for name in ["pattern.svg", "job.nc"] {
+        assert!(!out.join(name).exists(), "{name}");
+    }
+    // The edges are exact all the same, which the judge confirms.
+    let found = linkage::judge(
+        &read(out.join("linkage.obj")),
+        &read(out.join("layout.obj")),
+        2.0,
+    );
+    assert!(found.edge_error < 1e-6 && found.distance > 0.5);
+    // With --accept-distance the one threshold of taste is relaxed, the others are not.
+    let output = kagome(
+        &[
+            "make",
+            "out/design.toml",
+            "-q",
+            "-o",
+            "accepted",
+            "--accept-distance",
+            "5",
+        ],
+        folder.path(),
+    );
+    assert!(!stderr(&output).contains("misses the surface"));
+}
+
+/// Bad input: exit code 2, words that help, and nothing left behind.
+#[test]
+fn bad_input_costs_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("prose.obj", "It was a dark and stormy night.\n");
+    write("empty.obj", "");
+    write("nan.obj", "v 0 0 0\nv 100 0 0\nv 0 nan 0\nf 1 2 3\n");
+    write(
+        "parts.obj",
+        "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 50\nv 100 0 50\nv 0 100 50\nf 1 2 3\nf 4 5 6\n",
+    );
+    write(
+        "fan.obj",
+        "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 100\nv 0 -100 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n",
+    );
+    write(
+        "glue.toml",
+        &read(Path::new(env!("CARGO_MANIFEST_DIR")).join("profiles/leather-1.6.toml"))
+            .replace("thickness_mm", "thicknes_mm"),
+    );
+    write("file", "");
+    let cases: &[(&[&str], &[&str])] = &[
+        (&["nosuch.obj"], &["nosuch.obj"]),
+        (&["prose.obj"], &["prose.obj"]),
+        (&["empty.obj"], &["empty.obj"]),
+        (&["nan.obj"], &["nan.obj:3"]),
+        (&["parts.obj"], &["--part largest", "2 parts"]),
+        (&["fan.obj"], &["manifold"]),
+        (&["sample:octasphere"], &["closed", "rim"]),
+        (&["sample:vase"], &["2 rims"]),
+        (&["sample:teapot"], &["teapot", "hemisphere"]),
+        (&["sample:cap", "--edge", "900"], &["--edge", "900"]),
+        (&["sample:cap", "--edge", "0"], &["--edge"]),
+        (&["sample:cap", "--edge", "0.01"], &["--edge"]),
+        (&["sample:cap", "--sigma", "1"], &["σ = 1 "]),
+        (&["sample:cap", "--sigma", "2.1"], &["σ = 2.1", "at most 2"]),
+        (&["sample:cap", "--sigma", "NaN"], &["σ"]),
+        (
+            &["sample:cap", "--material", "cheese"],
+            &["cheese", "leather-1.6"],
+        ),
+        (
+            &["sample:cap", "--material", "./glue.toml"],
+            &["glue.toml", "thicknes_mm", "unknown"],
+        ),
+        (
+            &["sample:cap", "--machine", "press"],
+            &["press", "co2-600x400"],
+        ),
+        (&["sample:cap", "--size", "2000"], &["bed"]),
+        (&["sample:cap", "--hinge", "20"], &["hinge"]),
+        (&["sample:cap", "--kerf", "-1"], &["kerf"]),
+        (&["sample:bump", "--cone", "v99999999"], &["v99999999"]),
+        (&["sample:bump", "--cone", "5000,0,0"], &["mm away"]),
+        (
+            &["sample:bump", "--cone", "none", "--cone", "v1"],
+            &["--cone"],
+        ),
+        (
+            &["sample:bump", "--cone", "v1", "--cone", "v50"],
+            &["2 cones"],
+        ),
+        (&["sample:bump", "--cone", "v1:3"], &["3 units"]),
+        (&["sample:cap", "-o", "no/such/place"], &["no/such/place"]),
+        (&["sample:cap", "-o", "file"], &["file"]),
+        (&["sample:cap", "-o", "file/out"], &["file/out"]),
+    ];
+    let before = std::fs::read_dir(folder.path()).unwrap().count();
+    for (args, words) in cases {
+        let mut all = vec!["make", "-q"];
+        all.extend(*args);
+        let output = kagome(&all, folder.path());
+        let text = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {text}");
+        for word in *words {
+            assert!(text.contains(word), "{args:?} should say {word:?}: {text}");
+        }
+        assert!(!text.contains("panicked"), "{args:?}: {text}");
+        assert_eq!(
+            std::fs::read_dir(folder.path()).unwrap().count(),
+            before,
+            "{args:?} left something behind"
+        );
+    }
+}
