@@ -322,10 +322,11 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// A colour at a brightness; the conversion saturates.
+/// A colour at a brightness, in fixed point: this runs for every sample.
 #[inline]
 fn lit(colour: [u8; 3], light: f64) -> [u8; 3] {
-    colour.map(|c| (f64::from(c) * light + 0.5) as u8)
+    let light = (light * 256.0 + 0.5) as u32;
+    colour.map(|c| ((u32::from(c) * light + 128) >> 8).min(255) as u8)
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ mod canvas;
 mod colour;
 mod image;
 mod legend;
+mod palette;
 mod postcard;
 mod scene;
 

@@ -11,10 +11,10 @@ use crate::linkage::{Colour, Linkage};
 use crate::mesh::{HalfedgeId, Surface, VertexId};
 
 /// The body under a linkage.
-const BODY: Rgb = Rgb::hex(0xb4bfca);
+const BODY: Rgb = Rgb::hex(0xd8dfe6);
 /// Triangles of the two colours: near enough to be one sheet, far enough to see how they turn.
-const UP: Rgb = Rgb::hex(0xe9b872);
-const DOWN: Rgb = Rgb::hex(0xf3cd94);
+const UP: Rgb = Rgb::hex(0xe39a4c);
+const DOWN: Rgb = Rgb::hex(0xf1b56e);
 /// Outlines.
 const INK: Rgb = Rgb::hex(0x4a3423);
 /// Rims of surfaces and layouts.

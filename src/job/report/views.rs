@@ -84,7 +84,7 @@ pub(super) fn figures(
         } else {
             format!("{what}, {}", named.name)
         };
-        html.push_str(&figure(&canvas.image().coarser(), &alt, named.name, &rings));
+        html.push_str(&figure(&canvas.image(), &alt, named.name, &rings));
     }
     html
 }
