@@ -137,16 +137,15 @@ impl<'a> Scene<'a> {
         scene
     }
 
-    /// A linkage over its surface, coloured by a value at each of its points.
+    /// A linkage coloured by a value at each of its points; without the surface, which would hide the triangles that
+    /// lie under it.
     pub fn linkage_by_value(
-        surface: &Surface,
         linkage: &Linkage,
         positions: &[Point3<f64>],
         values: &[f64],
         scale: &'a ColourScale,
     ) -> Self {
         let mut scene = Self::default();
-        scene.body(surface, INSET * linkage.edge_mm);
         let (corners, ids): (Vec<_>, Vec<_>) = placed(linkage, positions).unzip();
         let values = ids
             .iter()
@@ -368,7 +367,7 @@ mod tests {
         assert_eq!(scene.points().count(), 6);
         let scale = ColourScale::distance(0.1);
         let all = vec![Point3::origin(); linkage.point_count()];
-        let scene = Scene::linkage_by_value(&square(), &linkage, &all, &[], &scale);
-        assert_eq!(scene.points().count(), 6 + 18);
+        let scene = Scene::linkage_by_value(&linkage, &all, &[], &scale);
+        assert_eq!(scene.points().count(), 18);
     }
 }

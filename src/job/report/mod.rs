@@ -225,13 +225,7 @@ fn linkage(out: &mut String, page: &Page<'_>, places: &[(usize, Point3<f64>)]) {
         )
     );
     let scale = ColourScale::distance(page.distance_limit_in_l);
-    let scene = Scene::linkage_by_value(
-        page.surface,
-        page.linkage,
-        page.positions,
-        page.distances_in_l,
-        &scale,
-    );
+    let scene = Scene::linkage_by_value(page.linkage, page.positions, page.distances_in_l, &scale);
     let _ = write!(
         out,
         "<section><h2>Distance from the surface</h2><p class=\"lead\">How far the corners of the triangles are from the surface, in triangle edges (L = {} mm).</p><div class=\"key\">{}</div><div class=\"grid\">{}</div></section>",

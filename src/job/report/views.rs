@@ -128,8 +128,8 @@ fn rings(
         } else {
             ""
         };
-        // White under red: visible on every colour.
-        for (colour, stroke) in [("#fff", 5.0), ("#b3261e", 2.5)] {
+        // White under black: visible on every colour.
+        for (colour, stroke) in [("#fff", 5.0), ("#14181d", 2.5)] {
             let _ = write!(
                 svg,
                 "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{stroke}\"{}/>",
@@ -143,7 +143,7 @@ fn rings(
         let right = x < 0.85 * width as f64;
         let _ = write!(
             svg,
-            "<text x=\"{}\" y=\"{}\" text-anchor=\"{}\" style=\"font-size:{}px;font-weight:700;fill:#b3261e;stroke:#fff;stroke-width:4px;paint-order:stroke\">{number}</text>",
+            "<text x=\"{}\" y=\"{}\" text-anchor=\"{}\" style=\"font-size:{}px;font-weight:700;fill:#14181d;stroke:#fff;stroke-width:4px;paint-order:stroke\">{number}</text>",
             short(
                 if right {
                     x + 1.3 * radius
