@@ -4,7 +4,7 @@
 //! [`View`]; a [`Paint`] says what colour a triangle has: plain, or by a value through a [`ColourScale`]. The scenes
 //! that a report needs are ready made: [`Scene`] with a surface, a layout or a linkage, and the [`postcard()`].
 //!
-//! The same input gives the same bytes: no threads, no clocks, one order of drawing.
+//! The same input gives the same bytes: no clocks, and one order of drawing within a picture.
 
 mod camera;
 mod canvas;

@@ -71,8 +71,7 @@ pub(super) fn figures(
         .map(|c| c.scale)
         .fold(f64::INFINITY, f64::min);
     cameras.iter_mut().for_each(|c| *c = c.with_scale(scale));
-    let mut html = String::new();
-    for (named, camera) in views.iter().zip(&cameras) {
+    let draw = &|named: &Named, camera: &Camera| {
         let mut canvas = Canvas::new(width, height, Some(PAPER));
         scene.draw(&mut canvas, camera);
         if style.shade_mm > 0.0 {
@@ -84,9 +83,23 @@ pub(super) fn figures(
         } else {
             format!("{what}, {}", named.name)
         };
-        html.push_str(&figure(&canvas.image(), &alt, named.name, &rings));
-    }
-    html
+        figure(&canvas.image(), &alt, named.name, &rings)
+    };
+    // A picture is a thread's work of its own; the page is put together in the order of the views.
+    std::thread::scope(|scope| {
+        let drawing: Vec<_> = views
+            .iter()
+            .zip(&cameras)
+            .map(|(named, camera)| scope.spawn(move || draw(named, camera)))
+            .collect();
+        drawing
+            .into_iter()
+            .map(|picture| match picture.join() {
+                Ok(html) => html,
+                Err(panic) => std::panic::resume_unwind(panic),
+            })
+            .collect()
+    })
 }
 
 fn figure(image: &Image, alt: &str, caption: &str, overlay: &str) -> String {
