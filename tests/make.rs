@@ -253,7 +253,7 @@ fn a_bump_without_its_cone_gets_a_report_but_no_job() {
     let words = stderr(&output);
     assert!(
         words.contains("misses the surface")
-            && words.contains("mm at (")
+            && words.contains("mm) at (")
             && words.contains("--cone"),
         "{words}"
     );

@@ -6,10 +6,13 @@
 
 mod cut;
 mod design;
+mod load;
 mod make;
 pub mod picture;
 pub mod report;
 mod request;
+mod shape;
+mod tell;
 mod verdict;
 
 use std::path::PathBuf;

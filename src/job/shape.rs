@@ -1,0 +1,247 @@
+//! From a surface to a judged linkage with its flat sheet in place on the bed.
+//!
+//! Cheap steps first: map, linkage and sheet show whether the request can work at all before the long solve. Where
+//! the number of triangles to remove at a cone is left open, more are removed only if fewer do not do.
+
+use nalgebra::{Point2, Point3};
+
+use super::MakeError;
+use super::load::Loaded;
+use super::request::Request;
+use super::tell::describe_map;
+use super::verdict::Verdict;
+use crate::base::progress::Progress;
+use crate::conformal::{ConeRequest, FlattenOptions, Flattened, Sizing, flatten};
+use crate::linkage::{Built, Linkage, LinkageOptions, build};
+use crate::machine::Machine;
+use crate::mesh::{ClosestPoint, Surface};
+use crate::pattern::{self, Sheet};
+use crate::rationalize::{Effort, Quality, rationalize};
+
+/// What the sheet is to be, whatever its shape.
+pub(crate) struct Stock<'a> {
+    /// Largest scale factor.
+    pub sigma: f64,
+    /// Ligament width, millimetres.
+    pub hinge_width_mm: f64,
+    /// Width of the cut, millimetres.
+    pub kerf_mm: f64,
+    /// Whose bed it must fit.
+    pub machine: &'a Machine,
+}
+
+/// A linkage solved and judged, and its sheet.
+pub(crate) struct Shape {
+    /// The map.
+    pub flat: Flattened,
+    /// The linkage as it was laid, before it was moved to its place on the bed.
+    pub built: Built,
+    /// Triangles removed at the cone.
+    pub removed: usize,
+    /// The sheet in its place on the bed.
+    pub sheet: Sheet,
+    /// The linkage with its flat positions there.
+    pub linkage: Linkage,
+    /// The layout's corners there, by face.
+    pub chart: Vec<[Point2<f64>; 3]>,
+    /// Where the points are in space, millimetres.
+    pub positions: Vec<Point3<f64>>,
+    /// What the solver did.
+    pub effort: Effort,
+    /// How good it is.
+    pub quality: Quality,
+    /// Whether it may be cut, as far as its shape goes.
+    pub verdict: Verdict,
+}
+
+/// Triangles around a positive cone that are tried in turn unless a number is given: those at it, then those and the
+/// next ring. λ falls to 0 at such a cone, and the finer the triangles, the deeper they reach into the fall.
+const REMOVALS: [usize; 2] = [4, 16];
+
+/// Finds the shape: the first number of removed triangles that passes, else the one that comes closest.
+pub(crate) fn shape(
+    request: &Request,
+    loaded: &Loaded,
+    stock: &Stock<'_>,
+    closest: &ClosestPoint,
+    progress: &dyn Progress,
+) -> Result<Shape, MakeError> {
+    let mut best: Option<Shape> = None;
+    for map in maps(request, loaded, stock.sigma, progress)? {
+        let shape = attempt(
+            request,
+            &loaded.import.surface,
+            map,
+            stock,
+            closest,
+            progress,
+        )?;
+        if shape.verdict.pass {
+            return Ok(shape);
+        }
+        let nearer =
+            |old: &Shape| shape.quality.distance_max.value < old.quality.distance_max.value;
+        if best.as_ref().is_none_or(nearer) {
+            best = Some(shape);
+        }
+    }
+    best.ok_or_else(|| MakeError::Internal("no layout was tried".into()))
+}
+
+/// A map with the options that made it and the number of triangles to remove.
+struct Map {
+    flat: Flattened,
+    options: FlattenOptions,
+    removal: usize,
+}
+
+/// The maps worth trying, the most promising first: one, unless the number of triangles to remove is open and there
+/// is a cone.
+fn maps(
+    request: &Request,
+    loaded: &Loaded,
+    sigma: f64,
+    progress: &dyn Progress,
+) -> Result<Vec<Map>, MakeError> {
+    let removals: Vec<usize> = match (request.remove_at_cone, &loaded.cones) {
+        (Some(count), _) => vec![count],
+        (None, ConeRequest::Given(cones)) if cones.iter().all(|c| c.units <= 0) => vec![0],
+        (None, _) => REMOVALS.to_vec(),
+    };
+    let mut maps = Vec::new();
+    for removal in removals {
+        progress.start("conformal map", None);
+        let options = FlattenOptions {
+            sigma,
+            cones: loaded.cones.clone(),
+            sizing: request.sizing,
+            cone_clearance: clearance(removal),
+        };
+        let flat =
+            flatten(&loaded.import.surface, &options, progress).map_err(MakeError::Conformal)?;
+        let coned = !flat.layout.cones.is_empty();
+        maps.push(Map {
+            flat,
+            options,
+            removal: if coned { removal } else { 0 },
+        });
+        if !coned {
+            break;
+        }
+    }
+    // A map within σ comes first, the one that removes least of those; then by what lies inside.
+    let fits = |map: &Map| map.flat.scale.max <= sigma;
+    maps.sort_by(|a, b| {
+        fits(b).cmp(&fits(a)).then_with(|| {
+            if fits(a) {
+                a.removal.cmp(&b.removal)
+            } else {
+                b.flat.scale.inside.total_cmp(&a.flat.scale.inside)
+            }
+        })
+    });
+    Ok(maps)
+}
+
+fn attempt(
+    request: &Request,
+    surface: &Surface,
+    map: Map,
+    stock: &Stock<'_>,
+    closest: &ClosestPoint,
+    progress: &dyn Progress,
+) -> Result<Shape, MakeError> {
+    let (flat, built) = lay_out(request, surface, &map, stock.sigma, progress)?;
+    progress.note(&describe_map(&flat, surface, stock.sigma));
+    // The sheet depends on flat positions only: what does not fit the bed is known before the long solve.
+    let sheet = Sheet::new(&built.linkage, stock.hinge_width_mm, stock.kerf_mm)
+        .map_err(MakeError::Pattern)?;
+    let (sheet, motion) =
+        pattern::placed(&sheet, stock.machine, request.mirror).map_err(MakeError::Pattern)?;
+    let moved = |p: Point2<f64>| {
+        let (x, y) = motion.apply(p.x, p.y);
+        Point2::new(x, y)
+    };
+    let mut linkage = built.linkage.clone();
+    linkage
+        .triangles
+        .iter_mut()
+        .for_each(|t| t.flat = t.flat.map(moved));
+    let chart = flat.layout.corners.iter().map(|c| c.map(moved)).collect();
+
+    progress.start("rationalising", Some(5));
+    let (positions, effort) = rationalize(
+        &linkage,
+        &built.start,
+        closest,
+        stock.sigma,
+        request.solver,
+        progress,
+    )
+    .map_err(MakeError::Rationalize)?;
+    let quality = Quality::measure(&linkage, &positions, surface, closest, stock.sigma);
+    let verdict = Verdict::judge(
+        &quality,
+        &flat,
+        surface,
+        built.overlaps.len(),
+        request.accept_distance,
+    );
+    Ok(Shape {
+        flat,
+        built,
+        removed: map.removal,
+        sheet,
+        linkage,
+        chart,
+        positions,
+        effort,
+        quality,
+        verdict,
+    })
+}
+
+/// Lays the lattice. With a number of triangles asked for, the edge is corrected once for those that the rim costs.
+fn lay_out(
+    request: &Request,
+    surface: &Surface,
+    map: &Map,
+    sigma: f64,
+    progress: &dyn Progress,
+) -> Result<(Flattened, Built), MakeError> {
+    let lattice = |flat: &Flattened| LinkageOptions {
+        edge_mm: flat.edge_mm,
+        orientation: request.orientation_deg.to_radians(),
+        handedness: request.handedness,
+        remove_at_cone: map.removal,
+        sigma,
+    };
+    let mut flat = map.flat.clone();
+    let mut built =
+        build(surface, &flat.layout, &lattice(&flat), progress).map_err(MakeError::Linkage)?;
+    if let Sizing::Triangles(wanted) = request.sizing {
+        let got = built.linkage.triangles.len() as f64;
+        let sizing = Sizing::Triangles(wanted * wanted / got);
+        flat = flat.resize(
+            surface,
+            &FlattenOptions {
+                sizing,
+                ..map.options.clone()
+            },
+        );
+        built =
+            build(surface, &flat.layout, &lattice(&flat), progress).map_err(MakeError::Linkage)?;
+    }
+    Ok((flat, built))
+}
+
+/// Radius around a cone, in L, that no triangle's centre comes within: 1/√3 with all triangles in place, 2/√3 without
+/// the four at the cone, 2 rings without sixteen; taken a little smaller for the second and third because corners
+/// reach further in than centres.
+fn clearance(removal: usize) -> f64 {
+    if removal == 0 {
+        0.7
+    } else {
+        (removal as f64 / 4.0).sqrt().floor().max(1.0) + 0.1
+    }
+}

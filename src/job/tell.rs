@@ -1,0 +1,241 @@
+//! What is told of a result: a summary for a person, warnings, and every figure for a machine.
+
+use serde_json::{Value, json};
+
+use super::cut::CutResult;
+use super::design::Design;
+use super::load::Loaded;
+use super::shape::Shape;
+use super::verdict::place;
+use crate::base::units::short;
+use crate::conformal::Flattened;
+use crate::machine::Machine;
+use crate::material::{Material, Source as SigmaSource};
+use crate::mesh::Surface;
+
+/// One line about the map: the cone, λ, the edge length.
+pub(crate) fn describe_map(flat: &Flattened, surface: &Surface, sigma: f64) -> String {
+    let cone = match flat.layout.cones.first() {
+        Some(cone) => format!(
+            "one cone at vertex {} {}",
+            cone.vertex,
+            place(surface.position(cone.vertex))
+        ),
+        None => "no cone".into(),
+    };
+    format!(
+        "conformal map: {cone}; λ from {} to {} (σ = {}), triangle edge {} mm",
+        short(flat.scale.min, 3),
+        short(flat.scale.max, 3),
+        short(sigma, 3),
+        short(flat.edge_mm, 3),
+    )
+}
+
+/// What does not forbid the cut but should be known before it.
+pub(crate) fn warnings(
+    loaded: &Loaded,
+    material: &Material,
+    shape: &Shape,
+    sigma: f64,
+) -> Vec<String> {
+    let (flat, built) = (&shape.flat, &shape.built);
+    let mut warnings: Vec<String> = loaded
+        .import
+        .report
+        .repairs()
+        .into_iter()
+        .map(|r| format!("the mesh was mended: {r}"))
+        .collect();
+    if sigma > material.sigma.max {
+        warnings.push(format!(
+            "σ = {} was asked for, but {} is known to stretch only to {} ({}): hinges are likely to tear. Cut a small trial first",
+            short(sigma, 3),
+            material.name,
+            short(material.sigma.max, 3),
+            source_in_words(material.sigma.source),
+        ));
+    } else if material.sigma.source != SigmaSource::Measured {
+        warnings.push(format!(
+            "the σ of {} ({}) is {}, not measured on your sheet: cut a small trial first",
+            material.name,
+            short(material.sigma.max, 3),
+            source_in_words(material.sigma.source),
+        ));
+    }
+    if flat.scale.max > sigma + 1e-9 || flat.scale.min < 1.0 - 1e-9 {
+        warnings.push(format!(
+            "the smooth map asks for λ up to {}, beyond σ = {}, on {} % of the surface; the triangles had to give way there",
+            short(flat.scale.max, 2),
+            short(sigma, 3),
+            short(100.0 * (1.0 - flat.scale.inside), 1),
+        ));
+    }
+    if !flat.metric.broken.is_empty() {
+        warnings.push(format!(
+            "{} faces of the mesh are too thin for the conformal map and were taken as flat lines: remesh evenly for a better map",
+            flat.metric.broken.len()
+        ));
+    }
+    if built.lost > 0 {
+        warnings.push(format!(
+            "{} triangles at the rim hang by fewer than two others and were left out",
+            built.lost
+        ));
+    }
+    if built.seam_edges > 0 {
+        warnings.push(format!(
+            "the sheet has a seam of {} triangle edges from the cone to the rim: its two sides must be joined by hand, edge to edge",
+            built.seam_edges
+        ));
+    }
+    warnings
+}
+
+fn source_in_words(source: SigmaSource) -> &'static str {
+    match source {
+        SigmaSource::Measured => "measured",
+        SigmaSource::Literature => "from literature",
+        SigmaSource::Estimate => "an estimate",
+    }
+}
+
+/// The result in a few lines: name and value, what a maker asks first.
+pub(crate) fn summary(
+    material: &Material,
+    machine: &Machine,
+    shape: &Shape,
+    cut: Option<&CutResult>,
+    sigma: f64,
+) -> Vec<(String, String)> {
+    let (sheet, quality, flat) = (&shape.sheet, &shape.quality, &shape.flat);
+    let figures = sheet.figures();
+    let mut lines = vec![
+        ("Material".to_owned(), material.title.clone()),
+        ("Machine".to_owned(), machine.title.clone()),
+        (
+            "Sheet".to_owned(),
+            format!(
+                "{} × {} mm",
+                short(figures.width_mm, 0),
+                short(figures.height_mm, 0)
+            ),
+        ),
+        (
+            "Pattern".to_owned(),
+            format!(
+                "{} triangles of {} mm, {} slits, hinges {} mm wide, cut {} mm wide",
+                figures.triangles,
+                short(flat.edge_mm, 2),
+                figures.slits,
+                short(sheet.metadata.hinge_width_mm, 2),
+                short(sheet.metadata.kerf_mm, 2),
+            ),
+        ),
+        (
+            "Hinges open".to_owned(),
+            format!(
+                "{} to {} times (σ = {})",
+                short(quality.opening[0], 2),
+                short(quality.opening[2], 2),
+                short(sigma, 3)
+            ),
+        ),
+        (
+            "Distance from the surface".to_owned(),
+            format!(
+                "at most {} mm ({} of a triangle edge)",
+                short(quality.distance_max.value * quality.edge_mm, 3),
+                short(quality.distance_max.value, 4),
+            ),
+        ),
+    ];
+    if let Some(cut) = cut {
+        lines.push((
+            "Job".to_owned(),
+            format!(
+                "{} strokes, {} m cut, {} m travel, {} on the simulated machine",
+                cut.toolpath.cuts.len(),
+                short(cut.cut_length_mm / 1000.0, 2),
+                short(cut.travel_mm / 1000.0, 2),
+                duration(cut.machine_s),
+            ),
+        ));
+    }
+    lines
+}
+
+/// Seconds as minutes and seconds.
+fn duration(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    if whole < 60 {
+        format!("{whole} s")
+    } else {
+        format!("{} min {:02} s", whole / 60, whole % 60)
+    }
+}
+
+/// Every figure, for `report.json` and the end of the page.
+pub(crate) fn figures(
+    design: &Design,
+    loaded: &Loaded,
+    shape: &Shape,
+    cut: Option<&CutResult>,
+    warnings: &[String],
+) -> Value {
+    let (flat, built) = (&shape.flat, &shape.built);
+    let surface = &loaded.import.surface;
+    let mut distortion = flat.layout.quasi_conformal_error(surface).into_vec();
+    distortion.sort_by(f64::total_cmp);
+    let at = |part: f64| {
+        distortion
+            .get((part * (distortion.len() - 1) as f64) as usize)
+            .copied()
+            .unwrap_or(1.0)
+    };
+    let s = shape.sheet.figures();
+    json!({
+        "verdict": shape.verdict,
+        "warnings": warnings,
+        "design": design,
+        "surface": {
+            "vertices": surface.positions().len(),
+            "faces": surface.faces().len(),
+            "area_mm2": surface.area(),
+            "import": loaded.import.report,
+        },
+        "conformal": {
+            "newton_steps": flat.metric.steps,
+            "angle_residual_rad": flat.metric.residual,
+            "closure": flat.layout.closure,
+            "broken_faces": flat.metric.broken.len(),
+            "lambda_min": flat.scale.min,
+            "lambda_max": flat.scale.max,
+            "lambda_max_at_mm": surface.position(flat.scale.max_vertex).coords.as_slice(),
+            "area_inside_sigma": flat.scale.inside,
+            "quasi_conformal_median": at(0.5),
+            "quasi_conformal_99_percent": at(0.99),
+        },
+        "linkage": {
+            "triangles": built.linkage.triangles.len(),
+            "hinges": built.linkage.hinges.len(),
+            "removed_at_cone": built.removed,
+            "left_out_at_rim": built.lost,
+            "seam_edges": built.seam_edges,
+            "overlaps_on_sheet": built.overlaps.len(),
+        },
+        "solve": { "steps": shape.effort.steps, "factorizations": shape.effort.factorizations },
+        "quality": shape.quality,
+        "sheet": {
+            "slits": s.slits,
+            "stars": s.stars,
+            "contours": s.contours,
+            "slit_length_mm": s.slit_length_mm,
+            "contour_length_mm": s.contour_length_mm,
+            "area_mm2": s.area_mm2,
+            "width_mm": s.width_mm,
+            "height_mm": s.height_mm,
+        },
+        "job": cut.map(CutResult::figures),
+    })
+}
