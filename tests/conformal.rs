@@ -1,5 +1,11 @@
 //! Conformal maps against closed forms.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a helper that fails, fails its test"
+)]
+
 use kagome::base::progress::Silent;
 use kagome::conformal::{Cone, ConeRequest, FlattenOptions, MetricSolver, Sizing, flatten};
 use kagome::mesh::{Sample, Surface, VertexId};

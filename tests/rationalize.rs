@@ -1,5 +1,11 @@
 //! From sample surfaces to exact linkages, and what happens where σ forbids one.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a helper that fails, fails its test"
+)]
+
 use kagome::base::progress::Silent;
 use kagome::conformal::{ConeRequest, FlattenOptions, Sizing, flatten};
 use kagome::linkage::{Built, Handedness, LinkageOptions, build};

@@ -3,7 +3,7 @@
 //! The slit sheet stretches the same in every direction, so a shape that it can take is a conformal image of the flat
 //! sheet with a scale factor λ between 1 (closed) and σ (open); see the paper, §3.1. Room by room: [`MetricSolver`]
 //! finds the scaled edge lengths (CETM), [`cut_to_rim`] opens a surface with a [`Cone`], [`Layout`] unfolds the faces
-//! and carries λ, [`propose_cone`] decides whether a cone is needed.
+//! and carries λ, [`flatten()`] does all of it, decides whether a cone is needed, and scales.
 //!
 //! Scope today: surfaces of disk type with no cone or one.
 

@@ -184,6 +184,9 @@ impl Design {
             100.0,
         )?;
         for (i, cone) in self.cone.iter().enumerate() {
+            for value in cone.at_mm.into_iter().flatten() {
+                ranged(&format!("cone[{i}].at_mm"), value, -1e6, 1e6)?;
+            }
             if cone.vertex.is_some() == cone.at_mm.is_some() {
                 return Err(Complaint::new(
                     format!("cone[{i}]"),

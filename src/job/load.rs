@@ -88,7 +88,7 @@ pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
             ConePlace::Point(at) => {
                 let found = ClosestPoint::new(&import.surface).query(Point3::from(at));
                 let (low, high) = import.surface.bounds();
-                if !(found.distance <= 0.1 * (high - low).norm()) {
+                if found.distance > 0.1 * (high - low).norm() {
                     return Err(MakeError::ConeFarAway {
                         at,
                         distance_mm: found.distance,

@@ -4,6 +4,12 @@
     dead_code,
     reason = "every test binary uses its own part of the judges"
 )]
+#![allow(
+    clippy::expect_used,
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a file that cannot be read fails the test"
+)]
 
 pub mod linkage;
 pub mod sheet;
