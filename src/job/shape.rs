@@ -120,12 +120,18 @@ fn maps(
         let flat =
             flatten(&loaded.import.surface, &options, progress).map_err(MakeError::Conformal)?;
         let coned = !flat.layout.cones.is_empty();
-        maps.push(Map {
-            flat,
-            options,
-            removal: if coned { removal } else { 0 },
-        });
-        if !coned {
+        let within = flat.scale.max <= sigma;
+        // Without a cone there is nothing to remove, and one such map is enough.
+        let known = maps.iter().any(|m: &Map| m.removal == 0);
+        if coned || !known {
+            let removal = if coned { removal } else { 0 };
+            maps.push(Map {
+                flat,
+                options,
+                removal,
+            });
+        }
+        if within && !coned {
             break;
         }
     }

@@ -36,7 +36,7 @@ pub fn postcard(
         Scene::linkage(surface, linkage, positions),
     );
     let right_camera = Camera::fit(
-        &View::front(surface).turned(0.6, 0.25),
+        &View::front(surface).turned(0.32, 0.08),
         body.points(),
         half(0.5 * width as f64),
         28.0,
