@@ -1,5 +1,6 @@
 //! What every room stands on, and nothing that belongs to one of them.
 //!
+//! - [`catalog`]: shipped profiles and profiles from files, by one name;
 //! - [`ids`]: typed indices and the per-element containers that only they open;
 //! - [`progress`]: how long work reports and how it is interrupted, without knowing a terminal;
 //! - [`atomic`]: outputs that appear complete or not at all;
@@ -8,6 +9,7 @@
 //! - [`units`]: the few conversions and number formats that several rooms share.
 
 pub mod atomic;
+pub mod catalog;
 pub mod document;
 pub mod ids;
 pub mod progress;

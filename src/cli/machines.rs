@@ -3,6 +3,7 @@
 use clap::{Args, Subcommand};
 
 use super::{Failure, Global, Terminal, print, print_json};
+use crate::base::catalog::CatalogError;
 use crate::base::units::short;
 use crate::machine::{self, Machine};
 
@@ -64,7 +65,7 @@ pub fn run(args: &MachinesArgs, global: &Global, _: &Terminal) -> Result<(), Fai
         What::Check { file } => {
             let machine = match machine::load(file) {
                 Ok(machine) => machine,
-                Err(machine::MachineError::Profile(wrong)) => {
+                Err(CatalogError::Profile(wrong)) => {
                     return Err(Failure::No(wrong.to_string()));
                 }
                 Err(other) => return Err(Failure::bad(other)),

@@ -3,6 +3,7 @@
 use clap::{Args, Subcommand};
 
 use super::{Failure, Global, Terminal, print, print_json};
+use crate::base::catalog::CatalogError;
 use crate::base::units::short;
 use crate::material::{self, Material};
 
@@ -69,7 +70,7 @@ pub fn run(args: &MaterialsArgs, global: &Global, _: &Terminal) -> Result<(), Fa
         What::Check { file } => {
             let material = match material::load(file) {
                 Ok(material) => material,
-                Err(material::MaterialError::Profile(wrong)) => {
+                Err(CatalogError::Profile(wrong)) => {
                     return Err(Failure::No(wrong.to_string()));
                 }
                 Err(other) => return Err(Failure::bad(other)),

@@ -8,7 +8,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::f64::consts::PI;
 
-use nalgebra::{Complex, ComplexField as _, Point2, Vector3};
+use nalgebra::{Complex, ComplexField as _, Point2};
 
 use super::{Cone, Metric};
 use crate::base::ids::{Id as _, Per};
@@ -288,19 +288,7 @@ impl Layout {
     /// The rotation that makes the sheet look like the surface seen along its mean normal, +Y up (+Z where the surface
     /// faces up or down): a mask lies upright on the sheet.
     fn upright_turn(&self, surface: &Surface) -> Complex<f64> {
-        let normal: Vector3<f64> = surface
-            .faces()
-            .ids()
-            .map(|f| surface.face_normal_doubled(f))
-            .sum();
-        let normal = normal
-            .try_normalize(1e-12 * surface.area())
-            .unwrap_or_else(Vector3::z);
-        let up = if normal.y.abs() > 0.9 {
-            -Vector3::z() * normal.y.signum()
-        } else {
-            Vector3::y()
-        };
+        let (normal, up) = surface.front();
         let right = up.cross(&normal).normalize();
         let up = normal.cross(&right);
         let mut fit = Complex::new(0.0, 0.0);

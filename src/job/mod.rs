@@ -22,6 +22,7 @@ pub use make::{FILES, Made, make};
 pub use request::{ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, Request, Source};
 pub use verdict::{COVERAGE_WANTED, EDGE_TOLERANCE, Reason, Verdict};
 
+use crate::base::catalog::CatalogError;
 use crate::base::document::DocumentError;
 use crate::base::progress::Interrupted;
 
@@ -96,10 +97,10 @@ pub enum MakeError {
     Edit(crate::mesh::edit::EditError),
     /// The material profile cannot be used.
     #[error(transparent)]
-    Material(crate::material::MaterialError),
+    Material(CatalogError),
     /// The machine profile cannot be used.
     #[error(transparent)]
-    Machine(crate::machine::MachineError),
+    Machine(CatalogError),
     /// The machine cannot cut the material.
     #[error(transparent)]
     Cut(crate::material::CutError),

@@ -8,9 +8,9 @@ use nalgebra::{Point2, Point3};
 use super::MakeError;
 use super::load::Loaded;
 use super::request::Request;
-use super::tell::describe_map;
-use super::verdict::Verdict;
+use super::verdict::{Verdict, place};
 use crate::base::progress::Progress;
+use crate::base::units::short;
 use crate::conformal::{ConeRequest, FlattenOptions, Flattened, Sizing, flatten};
 use crate::linkage::{Built, Linkage, LinkageOptions, build};
 use crate::machine::Machine;
@@ -250,4 +250,23 @@ fn clearance(removal: usize) -> f64 {
     } else {
         (removal as f64 / 4.0).sqrt().floor().max(1.0) + 0.1
     }
+}
+
+/// One line about the map: the cone, λ, the edge length.
+fn describe_map(flat: &Flattened, surface: &Surface, sigma: f64) -> String {
+    let cone = match flat.layout.cones.first() {
+        Some(cone) => format!(
+            "one cone at vertex {} {}",
+            cone.vertex,
+            place(surface.position(cone.vertex))
+        ),
+        None => "no cone".into(),
+    };
+    format!(
+        "conformal map: {cone}; λ from {} to {} (σ = {}), triangle edge {} mm",
+        short(flat.scale.min, 3),
+        short(flat.scale.max, 3),
+        short(sigma, 3),
+        short(flat.edge_mm, 3),
+    )
 }

@@ -6,31 +6,9 @@ use super::cut::CutResult;
 use super::design::Design;
 use super::load::Loaded;
 use super::shape::Shape;
-use super::verdict::place;
 use crate::base::units::short;
-use crate::conformal::Flattened;
 use crate::machine::Machine;
 use crate::material::{Material, Source as SigmaSource};
-use crate::mesh::Surface;
-
-/// One line about the map: the cone, λ, the edge length.
-pub(crate) fn describe_map(flat: &Flattened, surface: &Surface, sigma: f64) -> String {
-    let cone = match flat.layout.cones.first() {
-        Some(cone) => format!(
-            "one cone at vertex {} {}",
-            cone.vertex,
-            place(surface.position(cone.vertex))
-        ),
-        None => "no cone".into(),
-    };
-    format!(
-        "conformal map: {cone}; λ from {} to {} (σ = {}), triangle edge {} mm",
-        short(flat.scale.min, 3),
-        short(flat.scale.max, 3),
-        short(sigma, 3),
-        short(flat.edge_mm, 3),
-    )
-}
 
 /// What does not forbid the cut but should be known before it.
 pub(crate) fn warnings(

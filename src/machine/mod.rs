@@ -11,4 +11,4 @@ pub use profile::{
     Axes, Bed, Connection, Controller, Homing, Job, LaserTool, Machine, Motion, Origin, Place,
     PowerMode, Reach,
 };
-pub use shipped::{DEFAULT, MachineError, load, parse, shipped};
+pub use shipped::{DEFAULT, load, parse, shipped};

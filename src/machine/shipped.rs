@@ -1,8 +1,7 @@
 //! The machines in the binary, and machines from files.
 
-use std::path::{Path, PathBuf};
-
 use super::profile::Machine;
+use crate::base::catalog::{Catalog, CatalogError};
 use crate::base::document::{Document, DocumentError};
 
 /// The machine that is meant when none is named.
@@ -18,29 +17,10 @@ const SHIPPED: &[(&str, &str)] = &[
     ("fibre-300", include_str!("../../machines/fibre-300.toml")),
 ];
 
-/// Why there is no machine.
-#[derive(Debug, thiserror::Error)]
-pub enum MachineError {
-    /// Neither a shipped name nor a file.
-    #[error("there is no machine `{name}`. Shipped: {known}; or give the path of a TOML file")]
-    Unknown {
-        /// What was asked for.
-        name: String,
-        /// The names of the shipped ones.
-        known: String,
-    },
-    /// The file cannot be read.
-    #[error("machine file {path} cannot be read: {source}")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The profile is wrong.
-    #[error(transparent)]
-    Profile(#[from] DocumentError),
-}
+const CATALOG: Catalog = Catalog {
+    kind: "machine",
+    shipped: SHIPPED,
+};
 
 /// The names of the shipped machines with their texts.
 pub fn shipped() -> impl ExactSizeIterator<Item = (&'static str, &'static str)> {
@@ -50,25 +30,9 @@ pub fn shipped() -> impl ExactSizeIterator<Item = (&'static str, &'static str)> 
 /// A shipped machine by its name, or one from a file by its path. A shipped name wins; `./NAME` means the file.
 ///
 /// # Errors
-/// [`MachineError`]: unknown name (with the known ones), unreadable file, or a wrong profile with file, line and key.
-pub fn load(name_or_path: &str) -> Result<Machine, MachineError> {
-    if let Some((name, text)) = shipped().find(|(name, _)| *name == name_or_path) {
-        return Ok(parse(&format!("{name} (shipped)"), text)?);
-    }
-    let path = Path::new(name_or_path);
-    let looks_like_a_file =
-        path.extension().is_some_and(|e| e == "toml") || path.components().count() > 1;
-    if !looks_like_a_file && !path.is_file() {
-        return Err(MachineError::Unknown {
-            name: name_or_path.into(),
-            known: shipped().map(|(n, _)| n).collect::<Vec<_>>().join(", "),
-        });
-    }
-    let text = std::fs::read_to_string(path).map_err(|source| MachineError::Read {
-        path: path.into(),
-        source,
-    })?;
-    Ok(parse(name_or_path, &text)?)
+/// [`CatalogError`]: unknown name (with the known ones), unreadable file, or a wrong profile with file, line and key.
+pub fn load(name_or_path: &str) -> Result<Machine, CatalogError> {
+    CATALOG.load(name_or_path, parse)
 }
 
 /// A machine from the text of a profile; `file` is what messages call it.
@@ -81,6 +45,8 @@ pub fn parse(file: &str, text: &str) -> Result<Machine, DocumentError> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
 
     #[test]

@@ -11,4 +11,4 @@ mod shipped;
 pub use cut::{CutError, CutSetting, Laser, Process};
 pub use profile::{Kind, Material, Sigma, Source};
 pub(crate) use profile::{check_format, check_name};
-pub use shipped::{DEFAULT, MaterialError, load, parse, shipped};
+pub use shipped::{DEFAULT, load, parse, shipped};

@@ -1,8 +1,7 @@
 //! The materials in the binary, and materials from files.
 
-use std::path::{Path, PathBuf};
-
 use super::profile::Material;
+use crate::base::catalog::{Catalog, CatalogError};
 use crate::base::document::{Document, DocumentError};
 
 /// The material that is meant when none is named.
@@ -24,29 +23,10 @@ const SHIPPED: &[(&str, &str)] = &[
     ("plywood-3", include_str!("../../profiles/plywood-3.toml")),
 ];
 
-/// Why there is no material.
-#[derive(Debug, thiserror::Error)]
-pub enum MaterialError {
-    /// Neither a shipped name nor a file.
-    #[error("there is no material `{name}`. Shipped: {known}; or give the path of a TOML file")]
-    Unknown {
-        /// What was asked for.
-        name: String,
-        /// The names of the shipped ones.
-        known: String,
-    },
-    /// The file cannot be read.
-    #[error("material file {path} cannot be read: {source}")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The profile is wrong.
-    #[error(transparent)]
-    Profile(#[from] DocumentError),
-}
+const CATALOG: Catalog = Catalog {
+    kind: "material",
+    shipped: SHIPPED,
+};
 
 /// The names of the shipped materials with their texts.
 pub fn shipped() -> impl ExactSizeIterator<Item = (&'static str, &'static str)> {
@@ -56,25 +36,9 @@ pub fn shipped() -> impl ExactSizeIterator<Item = (&'static str, &'static str)> 
 /// A shipped material by its name, or one from a file by its path. A shipped name wins; `./NAME` means the file.
 ///
 /// # Errors
-/// [`MaterialError`]: unknown name (with the known ones), unreadable file, or a wrong profile with file, line and key.
-pub fn load(name_or_path: &str) -> Result<Material, MaterialError> {
-    if let Some((name, text)) = shipped().find(|(name, _)| *name == name_or_path) {
-        return Ok(parse(&format!("{name} (shipped)"), text)?);
-    }
-    let path = Path::new(name_or_path);
-    let looks_like_a_file =
-        path.extension().is_some_and(|e| e == "toml") || path.components().count() > 1;
-    if !looks_like_a_file && !path.is_file() {
-        return Err(MaterialError::Unknown {
-            name: name_or_path.into(),
-            known: shipped().map(|(n, _)| n).collect::<Vec<_>>().join(", "),
-        });
-    }
-    let text = std::fs::read_to_string(path).map_err(|source| MaterialError::Read {
-        path: path.into(),
-        source,
-    })?;
-    Ok(parse(name_or_path, &text)?)
+/// [`CatalogError`]: unknown name (with the known ones), unreadable file, or a wrong profile with file, line and key.
+pub fn load(name_or_path: &str) -> Result<Material, CatalogError> {
+    CATALOG.load(name_or_path, parse)
 }
 
 /// A material from the text of a profile; `file` is what messages call it.
@@ -87,6 +51,8 @@ pub fn parse(file: &str, text: &str) -> Result<Material, DocumentError> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
 
     #[test]
@@ -157,7 +123,7 @@ mod tests {
         );
         assert!(matches!(
             load("no/such.toml"),
-            Err(MaterialError::Read { .. })
+            Err(CatalogError::Read { .. })
         ));
     }
 }

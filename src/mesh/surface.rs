@@ -264,6 +264,20 @@ impl Surface {
         }
         normals
     }
+    /// How the surface is looked at from its front: the direction towards the eye (its mean normal) and up: +Y, or
+    /// ∓Z where it faces up or down. Both unit vectors, not always perpendicular.
+    pub fn front(&self) -> (Vector3<f64>, Vector3<f64>) {
+        let sum: Vector3<f64> = self.faces.ids().map(|f| self.face_normal_doubled(f)).sum();
+        let normal = sum
+            .try_normalize(1e-12 * self.area())
+            .unwrap_or_else(Vector3::z);
+        let up = if normal.y.abs() > 0.9 {
+            -Vector3::z() * normal.y.signum()
+        } else {
+            Vector3::y()
+        };
+        (normal, up)
+    }
     /// V − E + F.
     pub fn euler_characteristic(&self) -> i64 {
         self.positions.len() as i64 - self.edges().count() as i64 + self.faces.len() as i64

@@ -25,19 +25,7 @@ impl View {
     /// A surface from its front: along its mean normal, +Y up (−Z or +Z where it faces up or down), as the layout
     /// turns it.
     pub fn front(surface: &Surface) -> Self {
-        let normal: Vector3<f64> = surface
-            .faces()
-            .ids()
-            .map(|f| surface.face_normal_doubled(f))
-            .sum();
-        let direction = normal
-            .try_normalize(1e-12 * surface.area())
-            .unwrap_or_else(Vector3::z);
-        let up = if direction.y.abs() > 0.9 {
-            -Vector3::z() * direction.y.signum()
-        } else {
-            Vector3::y()
-        };
+        let (direction, up) = surface.front();
         Self { direction, up }
     }
 
