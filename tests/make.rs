@@ -72,6 +72,26 @@ fn make_and_judge(args: &[&str]) -> (sheet::Drawing, linkage::Findings) {
         sheet::compare(&drawing, &burnt.pieces, 0.011, 0.0),
         Vec::<String>::new()
     );
+    // What the simulated machine burnt through the sender. It moves in whole steps of 1/80 mm, and with dynamic power
+    // the beam goes out a few hundredths before each stop.
+    let machine = kagome::machine::load(kagome::machine::DEFAULT).unwrap();
+    let rehearsal = kagome::sim::rehearse(
+        read(out.join("job.nc")).as_bytes(),
+        &kagome::sim::Settings::of_machine(&machine),
+        &kagome::control::JobRules::default(),
+        &kagome::base::progress::Silent,
+    )
+    .unwrap();
+    let really: Vec<[[f64; 2]; 2]> = rehearsal
+        .burns
+        .iter()
+        .map(|b| [b.from_mm, b.to_mm])
+        .collect();
+    assert!(really.len() >= burnt.pieces.len() / 2);
+    assert_eq!(
+        sheet::compare(&drawing, &really, 0.02, 0.15),
+        Vec::<String>::new()
+    );
     // The drawing against the linkage: one slit a hinge that is not on a seam, one area a triangle.
     assert_eq!(drawing.slits.len(), found.hinges - found.seam_hinges);
     let triangle = 0.75f64.sqrt() / 2.0 * drawing.edge * drawing.edge;

@@ -345,6 +345,8 @@ impl<'a> System<'a> {
             self.assemble(x, stage);
             let before = energy;
             let mut accepted = false;
+            // Each further rejection raises the damping more steeply: it starts tiny, and every try is a factorisation.
+            let mut growth = 6.0;
             while damping < 1e6 {
                 progress.check()?;
                 damped.copy_from_slice(&self.matrix);
@@ -357,7 +359,8 @@ impl<'a> System<'a> {
                 match self.cholesky.factor(&damped) {
                     Ok(()) => {}
                     Err(FactorError::NotPositiveDefinite) => {
-                        damping = (damping * 6.0).max(1e-12);
+                        damping = (damping * growth).max(1e-12);
+                        growth *= 4.0;
                         continue;
                     }
                     Err(other) => return Err(other.into()),
@@ -376,7 +379,8 @@ impl<'a> System<'a> {
                     accepted = true;
                     break;
                 }
-                damping *= 6.0;
+                damping *= growth;
+                growth *= 4.0;
                 // Nothing left to gain at this accuracy.
                 if step.iter().fold(0.0f64, |m, s| m.max(s.abs())) < 1e-14 {
                     break;
