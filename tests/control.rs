@@ -435,6 +435,11 @@ fn the_protocol_follows_its_script() {
     let start = [
         expect("$I\n", "[VER:1.1h.20190830:]\r\n[OPT:V,15,128]\r\nok\r\n"),
         expect("$$\n", "$30=1000\r\n$32=1\r\nok\r\n"),
+        expect(
+            "$G\n",
+            "[GC:G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0]\r\nok\r\n",
+        ),
+        expect("$N\n", "$N0=\r\n$N1=\r\nok\r\n"),
     ];
     let job = checked("G21\nM4S1\nM5\n");
     let greeting = "\r\nGrbl 1.1h ['$' for help]\r\n";
@@ -461,7 +466,7 @@ fn the_protocol_follows_its_script() {
     // A machine that stays silent after the hold: it is not known to be dark, and that is said.
     let mut mute = start.to_vec();
     mute.push(expect("G21\nM4S1\nM5\n", "error:20\r\n"));
-    mute.push(expect("!\u{18}", ""));
+    mute.push(expect("!\u{18}\u{18}\u{18}", ""));
     let mut script = Script::new(greeting, mute);
     let error = send(&mut script, &job, &SendOptions::default(), &Silent).unwrap_err();
     assert!(
@@ -645,5 +650,103 @@ mod pty {
             text.contains("/dev/ttyKAGOME7") && text.contains("sim"),
             "{text}"
         );
+    }
+}
+
+/// A link that gives one error and then works again must not keep the machine from being stopped.
+#[test]
+fn a_hurt_link_still_stops_the_machine() {
+    struct Hurt<'a> {
+        link: &'a mut SimTransport,
+        writes: usize,
+        fail_at: usize,
+    }
+    impl kagome::control::Transport for Hurt<'_> {
+        fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+            self.writes += 1;
+            if self.writes == self.fail_at {
+                return Err(std::io::ErrorKind::TimedOut.into());
+            }
+            self.link.send(bytes)
+        }
+        fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> std::io::Result<usize> {
+            self.link.receive(buffer, wait)
+        }
+        fn now(&self) -> Duration {
+            self.link.now()
+        }
+        fn name(&self) -> &str {
+            "a hurt link"
+        }
+    }
+    let text = job_of(&slits(40));
+    let job = checked(&text);
+    for fail_at in [12, 15, 20, 30] {
+        let mut link = SimTransport::new(machine());
+        let mut hurt = Hurt {
+            link: &mut link,
+            writes: 0,
+            fail_at,
+        };
+        let error = send(&mut hurt, &job, &SendOptions::default(), &Silent).unwrap_err();
+        let Some(confirmed) = error.confirmed() else {
+            panic!("{error}")
+        };
+        assert!(matches!(confirmed.proof, Proof::BeamOff { .. }), "{error}");
+        // It stands already: nothing more is burnt however long one waits.
+        let mut machine = link.into_controller();
+        let burnt = machine.burns().len();
+        let now = machine.now_s();
+        machine.advance(now + 60.0);
+        assert!(!machine.beam_on());
+        assert_eq!(machine.burns().len(), burnt);
+    }
+}
+
+/// A far side that talks without end (noise, a boot loop) must not hold the sender for ever.
+#[test]
+fn endless_talk_is_not_waited_out() {
+    struct Babble {
+        now: Duration,
+        text: &'static [u8],
+        greeting: bool,
+    }
+    impl kagome::control::Transport for Babble {
+        fn send(&mut self, _: &[u8]) -> std::io::Result<()> {
+            Ok(())
+        }
+        fn receive(&mut self, buffer: &mut [u8], _: Duration) -> std::io::Result<usize> {
+            self.now += Duration::from_millis(10);
+            let said = if self.greeting {
+                self.text
+            } else {
+                b"\r\nGrbl 1.1h ['$' for help]\r\n"
+            };
+            self.greeting = true;
+            let count = said.len().min(buffer.len());
+            buffer[..count].copy_from_slice(&said[..count]);
+            Ok(count)
+        }
+        fn now(&self) -> Duration {
+            self.now
+        }
+        fn name(&self) -> &str {
+            "a babbling line"
+        }
+    }
+    let job = checked("G21\nM4S1\nM5\n");
+    for text in [
+        &b"xxxxxxxx"[..],
+        b"\r\n\r\n",
+        b"[MSG:'$H'|'$X' to unlock]\r\n",
+        b"ok\r\n",
+    ] {
+        let mut line = Babble {
+            now: Duration::ZERO,
+            text,
+            greeting: false,
+        };
+        let error = send(&mut line, &job, &SendOptions::default(), &Silent).unwrap_err();
+        assert!(line.now < Duration::from_secs(120), "{error}");
     }
 }

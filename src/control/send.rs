@@ -17,6 +17,8 @@ pub struct SendOptions {
     /// What `$30` must be: the S word of full power that the job was written for. None asks only that no S word is
     /// larger than the controller's.
     pub s_max: Option<f64>,
+    /// The controller's receive buffer as its profile has it, bytes; the smaller of this and what it tells is used.
+    pub buffer: Option<usize>,
     /// How long to wait for the controller's banner after the port was opened, before it is reset. Boards that reset
     /// by themselves need up to 2 s for their boot loader.
     pub banner_wait: Duration,
@@ -33,6 +35,7 @@ impl Default for SendOptions {
     fn default() -> Self {
         Self {
             s_max: None,
+            buffer: None,
             banner_wait: Duration::from_secs(2),
             poll: Duration::from_millis(200),
             silence: Duration::from_secs(5),
@@ -294,6 +297,12 @@ impl SendError {
 }
 
 const RESET: &[u8] = &[0x18];
+/// The largest receive buffer believed, bytes: what grblHAL and FluidNC boards tell at the most.
+const LARGEST_BUFFER: usize = 1024;
+/// How often the reset is repeated, and how long each waits for the banner: the stop is often wanted because bytes
+/// are being lost, and the one that counts may be among them.
+const RESETS: u32 = 3;
+const BANNER_WAIT: Duration = Duration::from_secs(1);
 /// How long an answer to a question outside the job may take.
 const ANSWER: Duration = Duration::from_secs(3);
 /// How long a hold may brake, if reports say that it still does: 10 m/min at 10 mm/s² is 17 s.
@@ -352,7 +361,7 @@ pub fn send(
             firmware,
             position_mm: sender.status.as_ref().and_then(|s| s.position_mm),
         }),
-        Err(Trouble::Link(source)) => Err(sender.link_lost(source)),
+        Err(Trouble::Link(source)) => Err(sender.link_failed(source)),
         Err(Trouble::Stop(reason)) => Err(sender.stop(reason)),
     };
     sender.armed = false;
@@ -367,7 +376,8 @@ struct Link<'a> {
 }
 
 impl Link<'_> {
-    /// The next reply, waiting for it until `deadline`.
+    /// The next reply, waiting for it until `deadline`. It looks at the line once even if that has passed, and it
+    /// comes back in time however much noise the line carries.
     fn reply(&mut self, deadline: Duration) -> io::Result<Option<Reply>> {
         loop {
             if let Some(reply) = self.lines.pop_front() {
@@ -378,9 +388,6 @@ impl Link<'_> {
             let count = self
                 .transport
                 .receive(&mut buffer, deadline.saturating_sub(now))?;
-            if count == 0 && self.transport.now() >= deadline {
-                return Ok(None);
-            }
             for &byte in &buffer[..count] {
                 if byte == b'\n' || byte == b'\r' {
                     let line = String::from_utf8_lossy(&self.partial);
@@ -391,6 +398,18 @@ impl Link<'_> {
                     self.partial.push(byte);
                 }
             }
+            if self.lines.is_empty() && self.transport.now() >= deadline {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// As [`Link::reply`], and nothing once `deadline` has passed: for loops that must end whatever the far side says.
+    fn reply_before(&mut self, deadline: Duration) -> io::Result<Option<Reply>> {
+        if self.transport.now() >= deadline {
+            Ok(None)
+        } else {
+            self.reply(deadline)
         }
     }
 
@@ -471,16 +490,17 @@ impl Sender<'_> {
             let deadline = self.now() + wait;
             while let Some(reply) = self
                 .link
-                .reply(deadline)
+                .reply_before(deadline)
                 .map_err(|source| self.connect_error(source))?
             {
+                self.check_interrupted()?;
                 match reply {
                     Reply::Banner(text) => {
                         // What follows at once (the lock's message) belongs to the banner.
                         let settle = self.now() + Duration::from_millis(100);
                         while self
                             .link
-                            .reply(settle)
+                            .reply_before(settle)
                             .map_err(|source| self.connect_error(source))?
                             .is_some()
                         {}
@@ -497,6 +517,16 @@ impl Sender<'_> {
         })
     }
 
+    /// The person may change their mind before anything is sent.
+    fn check_interrupted(&self) -> Result<(), SendError> {
+        if self.progress.interrupted() {
+            return Err(SendError::NotReady {
+                why: "interrupted before the job began".into(),
+            });
+        }
+        Ok(())
+    }
+
     /// Sends a question and collects what is said until `ok`.
     fn ask(&mut self, question: &str) -> Result<Vec<Reply>, SendError> {
         let lost = |port: String, source| SendError::Connect { port, source };
@@ -507,9 +537,10 @@ impl Sender<'_> {
         let deadline = self.now() + ANSWER;
         let mut answer = Vec::new();
         loop {
+            self.check_interrupted()?;
             match self
                 .link
-                .reply(deadline)
+                .reply_before(deadline)
                 .map_err(|source| lost(self.port(), source))?
             {
                 Some(Reply::Ok) => return Ok(answer),
@@ -559,12 +590,18 @@ impl Sender<'_> {
                 buffer = fields.nth(2).and_then(|f| f.parse::<usize>().ok());
             }
         }
-        let Some(buffer) = buffer.filter(|&b| b >= 81) else {
+        let Some(told) = buffer.filter(|&b| b >= 82) else {
             return not_ready(
                 "the controller does not tell the size of its receive buffer ($I): it is not a GRBL 1.1 controller that can be streamed to"
                     .into(),
             );
         };
+        // One byte less than told: grblHAL tells the size of a ring that holds one less. And never more than the
+        // profile says, nor more than any of these boards has: a damaged number must not overrun the real buffer.
+        let buffer = told
+            .min(self.options.buffer.unwrap_or(LARGEST_BUFFER))
+            .min(LARGEST_BUFFER)
+            - 1;
         let (mut laser, mut s_max) = (None, None);
         for reply in self.ask("$$")? {
             match reply {
@@ -596,7 +633,42 @@ impl Sender<'_> {
                 self.job.largest_s()
             ));
         }
+        self.check_modal_state()?;
         Ok(buffer)
+    }
+
+    /// The beam must be off before the job, and no startup block may light it after a reset: blocks run after every
+    /// one of them, also after the one that ends a stop.
+    fn check_modal_state(&mut self) -> Result<(), SendError> {
+        for reply in self.ask("$G")? {
+            if let Reply::Message(text) = reply
+                && text.starts_with("[GC:")
+                && text
+                    .trim_end_matches(']')
+                    .split([' ', ':'])
+                    .any(|word| word == "M3" || word == "M4")
+            {
+                return Err(SendError::NotReady {
+                    why: format!(
+                        "the controller's beam is armed already ({text}): send M5 to it, then try again"
+                    ),
+                });
+            }
+        }
+        for reply in self.ask("$N")? {
+            if let Reply::Unknown(text) = reply
+                && let Some((name, block)) = text.split_once('=')
+                && name.starts_with("$N")
+                && !block.trim().is_empty()
+            {
+                return Err(SendError::NotReady {
+                    why: format!(
+                        "the controller runs a startup block after every reset ({text}), also after an emergency stop: clear it with {name}= and send again"
+                    ),
+                });
+            }
+        }
+        Ok(())
     }
 
     /// Asks for a status and waits for it.
@@ -606,9 +678,10 @@ impl Sender<'_> {
             .send(b"?")
             .map_err(|source| self.connect_error(source))?;
         loop {
+            self.check_interrupted()?;
             match self
                 .link
-                .reply(deadline)
+                .reply_before(deadline)
                 .map_err(|source| self.connect_error(source))?
             {
                 Some(Reply::Status(status)) => return Ok(status.state),
@@ -741,6 +814,11 @@ impl Sender<'_> {
                     if state == MachineState::Alarm {
                         return Err(Trouble::Stop(StopReason::Alarm(0)));
                     }
+                    if matches!(state, MachineState::Check | MachineState::Sleep) {
+                        return Err(Trouble::Stop(StopReason::Ledger(format!(
+                            "the machine has gone to {state:?} in the middle of the job"
+                        ))));
+                    }
                     if state != MachineState::Idle {
                         (idle_since, idle_reports) = (None, 0);
                         continue;
@@ -807,9 +885,29 @@ impl Sender<'_> {
         }
     }
 
+    /// The link gave an error. Often it is only hurt: the machine is stopped all the same, as far as it listens.
+    fn link_failed(&mut self, source: io::Error) -> SendError {
+        match self.stop_sequence(false) {
+            Ok(proof @ Proof::BeamOff { .. }) => SendError::LinkLost {
+                port: self.port(),
+                source,
+                confirmed: self.confirmed(proof),
+            },
+            _ => self.link_lost(source),
+        }
+    }
+
     /// Hold, wait until it stands, reset, and see that it is dark.
     fn stop(&mut self, reason: StopReason) -> SendError {
-        match self.stop_sequence() {
+        // After a restart, an alarm or lost bytes the position told may be anything.
+        let trusted = matches!(
+            reason,
+            StopReason::Interrupted
+                | StopReason::Refused { .. }
+                | StopReason::Paused { .. }
+                | StopReason::BeamOn { .. }
+        );
+        match self.stop_sequence(trusted) {
             Ok(proof) => SendError::Stopped {
                 reason,
                 confirmed: self.confirmed(proof),
@@ -818,25 +916,36 @@ impl Sender<'_> {
         }
     }
 
-    fn stop_sequence(&mut self) -> io::Result<Proof> {
-        self.link.send(b"!")?;
-        let stood = self.wait_until_still()?;
+    /// Brings the machine to rest and shows that it is dark. `trusted`: nothing so far speaks against its position.
+    ///
+    /// An error in the first half (the hold) does not end it: the reset is what puts the beam out.
+    fn stop_sequence(&mut self, trusted: bool) -> io::Result<Proof> {
+        let (stood, undisturbed) = match self.link.send(b"!").and_then(|()| self.wait_until_still())
+        {
+            Ok(seen) => seen,
+            Err(_) => (false, false),
+        };
         // Also when it does not stand: in motion a reset puts the beam out at once.
-        self.link.send(RESET)?;
-        let deadline = self.now() + ANSWER;
         let mut banner = false;
-        while let Some(reply) = self.link.reply(deadline)? {
-            if matches!(reply, Reply::Banner(_)) {
-                banner = true;
+        let mut failure = None;
+        for _ in 0..RESETS {
+            match self.reset_and_hear() {
+                Ok(heard) => banner = heard,
+                Err(error) => failure = Some(error),
+            }
+            if banner {
                 break;
             }
+        }
+        if let (false, Some(error)) = (banner, failure) {
+            return Err(error);
         }
         let deadline = self.now() + ANSWER;
         let mut last = None;
         while self.now() < deadline {
             self.link.send(b"?")?;
             let until = self.now() + STOP_POLL;
-            while let Some(reply) = self.link.reply(until)? {
+            while let Some(reply) = self.link.reply_before(until)? {
                 if let Reply::Status(status) = reply {
                     let locked = status.state == MachineState::Alarm;
                     let dark = status.dark_and_still();
@@ -844,7 +953,7 @@ impl Sender<'_> {
                     self.status = Some(status);
                     if dark && banner {
                         return Ok(Proof::BeamOff {
-                            position_kept: stood && !locked,
+                            position_kept: stood && undisturbed && trusted && !locked,
                         });
                     }
                 }
@@ -859,31 +968,51 @@ impl Sender<'_> {
         })
     }
 
-    /// Polls until a report says that the machine stands; false if none does in time.
-    fn wait_until_still(&mut self) -> io::Result<bool> {
+    /// One reset; true if the banner answers it.
+    fn reset_and_hear(&mut self) -> io::Result<bool> {
+        self.link.send(RESET)?;
+        let deadline = self.now() + BANNER_WAIT;
+        while let Some(reply) = self.link.reply_before(deadline)? {
+            if matches!(reply, Reply::Banner(_)) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Polls until a report says that the machine stands. First: whether one did in time. Second: whether nothing was
+    /// heard that a controller says only when it starts anew, or never.
+    fn wait_until_still(&mut self) -> io::Result<(bool, bool)> {
         let start = self.now();
         let mut deadline = start + ANSWER;
+        let mut undisturbed = true;
+        let mut running = false;
         while self.now() < deadline {
-            self.link.send(b"?")?;
+            // The hold is repeated as long as the machine says that it runs: a single byte may be lost.
+            self.link.send(if running { b"!?" } else { b"?" })?;
             let until = self.now() + STOP_POLL;
-            while let Some(reply) = self.link.reply(until)? {
+            while let Some(reply) = self.link.reply_before(until)? {
                 match reply {
                     Reply::Status(status) => {
                         let state = status.state;
                         self.status = Some(status);
+                        running = state == MachineState::Run;
                         match state {
                             MachineState::Hold(true) | MachineState::Door(true) => {
-                                return Ok(true);
+                                return Ok((true, undisturbed));
                             }
                             // Locked: it stands, or will not say more before the reset.
-                            MachineState::Alarm | MachineState::Sleep => return Ok(false),
+                            MachineState::Alarm | MachineState::Sleep => {
+                                return Ok((false, undisturbed));
+                            }
                             MachineState::Hold(false) | MachineState::Door(false) => {
                                 deadline = start + BRAKING;
                             }
                             _ => {}
                         }
                     }
-                    Reply::Alarm(_) => return Ok(false),
+                    Reply::Alarm(_) => return Ok((false, undisturbed)),
+                    Reply::Banner(_) | Reply::Unknown(_) => undisturbed = false,
                     // Answers to lines sent before the hold still count.
                     Reply::Ok if self.settle().is_ok() => self.acknowledged += 1,
                     Reply::Error(_) => {
@@ -893,6 +1022,6 @@ impl Sender<'_> {
                 }
             }
         }
-        Ok(false)
+        Ok((false, undisturbed))
     }
 }

@@ -149,7 +149,9 @@ impl Transport for SerialTransport {
                 Err(error)
                     if matches!(
                         error.kind(),
-                        io::ErrorKind::TimedOut | io::ErrorKind::Interrupted
+                        io::ErrorKind::TimedOut
+                            | io::ErrorKind::Interrupted
+                            | io::ErrorKind::WouldBlock
                     ) && Instant::now() < give_up => {}
                 Err(error) => return Err(error),
             }
@@ -170,7 +172,9 @@ impl Transport for SerialTransport {
             Err(error)
                 if matches!(
                     error.kind(),
-                    io::ErrorKind::TimedOut | io::ErrorKind::Interrupted
+                    io::ErrorKind::TimedOut
+                        | io::ErrorKind::Interrupted
+                        | io::ErrorKind::WouldBlock
                 ) =>
             {
                 Ok(0)
