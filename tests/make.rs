@@ -371,7 +371,16 @@ fn bad_input_costs_nothing() {
         ),
         (&["sample:cap", "--size", "2000"], &["bed"]),
         (&["sample:cap", "--hinge", "20"], &["hinge"]),
-        (&["sample:cap", "--kerf", "-1"], &["kerf"]),
+        (&["sample:cap", "--hinge", "1e-300"], &["--hinge", "0.01"]),
+        (&["sample:cap", "--kerf", "-1"], &["--kerf"]),
+        (
+            &["sample:cap", "--accept-distance", "nan"],
+            &["--accept-distance"],
+        ),
+        (
+            &["sample:cap", "--accept-distance", "inf"],
+            &["--accept-distance"],
+        ),
         (&["sample:bump", "--cone", "v99999999"], &["v99999999"]),
         (&["sample:bump", "--cone", "5000,0,0"], &["mm away"]),
         (

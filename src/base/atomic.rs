@@ -24,6 +24,12 @@ pub enum WriteError {
         /// The output asked for.
         path: PathBuf,
     },
+    /// The name belongs to something that is no directory.
+    #[error("{path} is there already and is not a directory; choose another place with -o")]
+    NotADirectory {
+        /// The directory asked for.
+        path: PathBuf,
+    },
     /// Replacing would delete something that this program did not make.
     #[error(
         "{path} holds {stranger}, which kagome did not write; it is not replaced, even with --force: choose another place with -o"
@@ -112,7 +118,7 @@ pub fn check_directory(path: &Path, names: &[&str], force: bool) -> Result<(), W
                 return Err(WriteError::Exists { path: path.into() });
             }
         }
-        Ok(_) => return Err(WriteError::Exists { path: path.into() }),
+        Ok(_) => return Err(WriteError::NotADirectory { path: path.into() }),
         Err(_) => {}
     }
     tempfile::Builder::new()

@@ -218,7 +218,40 @@ pub fn run(args: &MakeArgs, global: &Global, terminal: &Terminal) -> Result<(), 
     }
 }
 
+/// Options that a design file decides for itself.
+fn decided_by_design(args: &MakeArgs) -> Vec<&'static str> {
+    [
+        (args.edge.is_some(), "--edge"),
+        (args.triangles.is_some(), "--triangles"),
+        (args.material != crate::material::DEFAULT, "--material"),
+        (args.machine != crate::machine::DEFAULT, "--machine"),
+        (args.sigma.is_some(), "--sigma"),
+        (args.hinge.is_some(), "--hinge"),
+        (args.kerf.is_some(), "--kerf"),
+        (!args.cones.is_empty(), "--cone"),
+        (args.remove.is_some(), "--remove"),
+        (args.orientation.0 != 0.0, "--orientation"),
+        (matches!(args.pattern, PatternArg::Left), "--pattern"),
+        (args.mirror, "--mirror"),
+        (matches!(args.solver, SolverArg::Projection), "--solver"),
+        (args.surface.size.is_some(), "--size"),
+        (args.surface.scale != 1.0, "--scale"),
+        (args.surface.part.is_some(), "--part"),
+    ]
+    .into_iter()
+    .filter_map(|(given, name)| given.then_some(name))
+    .collect()
+}
+
 fn from_design(args: &MakeArgs) -> Result<Request, Failure> {
+    let ignored = decided_by_design(args);
+    if !ignored.is_empty() {
+        return Err(Failure::Bad(format!(
+            "{} cannot be given with a design file, which decides it: edit {} instead",
+            ignored.join(", "),
+            args.surface.surface
+        )));
+    }
     let path = Path::new(&args.surface.surface);
     let text = std::fs::read_to_string(path)
         .map_err(|e| Failure::Bad(format!("cannot read {}: {e}", path.display())))?;

@@ -1,14 +1,15 @@
 //! `kagome send`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use super::{Failure, Global, Terminal};
+use crate::base::progress::Progress as _;
 use crate::control::{Job, JobRules, SendError, SendOptions, SendReport, SerialTransport, send};
-use crate::gcode;
 use crate::machine::{self, Machine};
 use crate::sim::{RehearsalError, RehearsalSummary, Settings, rehearse};
+use crate::{gcode, pattern};
 
 /// Send a job to a machine, and stop it with proof if anything goes wrong
 #[derive(Args, Debug)]
@@ -40,19 +41,58 @@ pub struct SendArgs {
 /// What GRBL boards use unless they were built otherwise.
 const STANDARD_BAUD: u32 = 115_200;
 
-/// The profile asked for, else the shipped one that the job's header names, else none: G-code of other programs is
-/// sent without a profile to compare with.
+/// The profile asked for, else the one that the job's header names, else none: G-code of other programs may come
+/// without a profile to compare with.
 pub(super) fn machine_for(asked: Option<&str>, job: &[u8]) -> Result<Option<Machine>, Failure> {
     if let Some(name) = asked {
         return machine::load(name).map(Some).map_err(Failure::bad);
     }
     let text = String::from_utf8_lossy(job);
-    let named = gcode::machine_of(&text)
-        .filter(|name| machine::shipped().any(|(shipped, _)| shipped == *name));
-    named
-        .map(|name| machine::load(name).map_err(Failure::bad))
-        .transpose()
+    let Some(named) = gcode::machine_of(&text) else {
+        return Ok(None);
+    };
+    if !machine::shipped().any(|(shipped, _)| shipped == named) {
+        return Err(Failure::Bad(format!(
+            "the job was made for the machine {named}, which is not a shipped profile: name its file with --machine"
+        )));
+    }
+    machine::load(named).map(Some).map_err(Failure::bad)
 }
+
+/// The job must be good for the machine, and cut its sheet if the drawing lies beside it: what `verify` would say.
+fn check_job(path: &Path, text: &[u8], machine: &Machine, args: &SendArgs) -> Result<(), Failure> {
+    let text = String::from_utf8_lossy(text);
+    let beside = path.with_file_name("pattern.svg");
+    // Only our own jobs belong to the drawing beside them.
+    let ours = gcode::machine_of(&text).is_some();
+    let sheet = match std::fs::read_to_string(&beside) {
+        Ok(drawing) if ours => Some(
+            pattern::read_svg(&drawing)
+                .map_err(|e| Failure::Bad(format!("{}: {e}", beside.display())))?,
+        ),
+        _ => None,
+    };
+    let verdict = gcode::verify(&text, machine, sheet.as_ref(), None).map_err(Failure::bad)?;
+    let findings: Vec<String> = verdict
+        .findings
+        .iter()
+        .filter(|f| !(args.allow_constant_power && f.rule == gcode::Rule::ConstantPower))
+        .take(SHOWN)
+        .map(|f| format!("\n  {f}"))
+        .collect();
+    if findings.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::No(format!(
+        "{} is not good for {}; nothing was sent. `kagome verify` lists everything{}",
+        path.display(),
+        machine.name,
+        findings.concat()
+    )))
+}
+
+/// Findings shown; `verify` shows the rest.
+const SHOWN: usize = 5;
 
 /// Sends a job.
 pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
@@ -67,8 +107,29 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
         allow_constant_power: args.allow_constant_power,
         ..JobRules::default()
     };
+    if args.s_max.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
+        return Err(Failure::Bad("--s-max must be a number above zero".into()));
+    }
     let s_max = args.s_max.or(machine.as_ref().map(|m| m.laser.s_max));
     let here = |error| Failure::Bad(format!("{}: {error}", args.job.display()));
+    if let Some(machine) = &machine {
+        // First the plain faults, in the sender's words.
+        Job::check(&text, &rules)
+            .map_err(|error| Failure::Bad(format!("{}: {error}", args.job.display())))?;
+        check_job(&args.job, &text, machine, args)?;
+        if let Some(made_for) = gcode::machine_of(&String::from_utf8_lossy(&text))
+            && made_for != machine.name
+        {
+            terminal.note(&format!(
+                "warning: the job was made for {made_for}, it goes to {}: powers and speeds may not suit it",
+                machine.name
+            ));
+        }
+    } else {
+        terminal.note(
+            "the job names no machine profile: bed and sheet are not checked (see --machine)",
+        );
+    }
     if args.port == "sim" {
         let mut settings = machine
             .as_ref()
@@ -88,10 +149,17 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
     let job = Job::check(&text, &rules).map_err(here)?;
     let options = SendOptions {
         s_max,
+        buffer: machine
+            .as_ref()
+            .map(|m| m.connection.receive_buffer_bytes as usize),
         ..SendOptions::default()
     };
     // From the opening on: it resets the board, and an exit in between would leave it to itself.
-    let guard = terminal.forbid_exit();
+    let Some(guard) = terminal.forbid_exit() else {
+        return Err(Failure::Bad(
+            "Ctrl-C cannot be caught here, so a running job could not be stopped with proof; nothing was sent".into(),
+        ));
+    };
     let baud = args
         .baud
         .or(machine.map(|m| m.connection.baud))

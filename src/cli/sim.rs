@@ -43,9 +43,8 @@ fn speed(text: &str) -> Result<Speed, String> {
         return Ok(Speed(None));
     }
     match text.parse::<f64>() {
-        Ok(0.0) => Ok(Speed(None)),
-        Ok(value) if value > 0.0 && value.is_finite() => Ok(Speed(Some(value))),
-        _ => Err("a number above zero, or max".into()),
+        Ok(value) if (0.01..=1000.0).contains(&value) => Ok(Speed(Some(value))),
+        _ => Err("a number from 0.01 to 1000, or max".into()),
     }
 }
 

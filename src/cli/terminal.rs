@@ -15,15 +15,25 @@ pub struct Terminal {
     bar: Option<Mutex<ProgressBar>>,
     stop: Arc<AtomicBool>,
     guards: Arc<AtomicUsize>,
+    /// Ctrl-C reaches us.
+    handled: bool,
 }
 
 /// While it lives, no number of Ctrl-C ends the program: see [`Terminal::forbid_exit`].
 #[derive(Debug)]
-pub struct ExitGuard(Arc<AtomicUsize>);
+pub struct ExitGuard {
+    guards: Arc<AtomicUsize>,
+    #[cfg(unix)]
+    caught: Vec<signal_hook::SigId>,
+}
 
 impl Drop for ExitGuard {
     fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::SeqCst);
+        self.guards.fetch_sub(1, Ordering::SeqCst);
+        #[cfg(unix)]
+        self.caught.drain(..).for_each(|id| {
+            signal_hook::low_level::unregister(id);
+        });
     }
 }
 
@@ -40,14 +50,15 @@ impl Terminal {
         let guards = Arc::new(AtomicUsize::new(0));
         let (flag, held) = (stop.clone(), guards.clone());
         // A handler that cannot be set (one is there already) leaves the system's own: the program just ends.
-        let _ = ctrlc::set_handler(move || {
+        let handled = ctrlc::set_handler(move || {
             if flag.swap(true, Ordering::SeqCst) {
                 if held.load(Ordering::SeqCst) == 0 {
                     std::process::exit(130);
                 }
                 tell("still stopping the machine: wait until it is known that the beam is off");
             }
-        });
+        })
+        .is_ok();
         let bar =
             (!quiet && std::io::stderr().is_terminal()).then(|| Mutex::new(ProgressBar::hidden()));
         Self {
@@ -55,6 +66,7 @@ impl Terminal {
             bar,
             stop,
             guards,
+            handled,
         }
     }
 
@@ -62,10 +74,25 @@ impl Terminal {
     /// leave the controller with a full buffer and nobody to stop it: the stop sequence (hold, reset, proof that the
     /// beam is off) must come to its end, and an impatient person presses twice. It always ends: each of its steps
     /// has a time limit.
+    ///
+    /// Ctrl-\\ (which would end the program) and Ctrl-Z (which would freeze it over a running machine) ask for the stop
+    /// too while the guard lives. `None` if signals cannot be caught: then nothing may be started that needs a stop.
     #[must_use = "the exit is forbidden only while the guard lives"]
-    pub fn forbid_exit(&self) -> ExitGuard {
+    pub fn forbid_exit(&self) -> Option<ExitGuard> {
+        if !self.handled {
+            return None;
+        }
+        #[cfg(unix)]
+        let caught = [signal_hook::consts::SIGQUIT, signal_hook::consts::SIGTSTP]
+            .into_iter()
+            .map(|signal| signal_hook::flag::register(signal, self.stop.clone()).ok())
+            .collect::<Option<Vec<_>>>()?;
         self.guards.fetch_add(1, Ordering::SeqCst);
-        ExitGuard(self.guards.clone())
+        Some(ExitGuard {
+            guards: self.guards.clone(),
+            #[cfg(unix)]
+            caught,
+        })
     }
 
     /// The flag that Ctrl-C raises, for code that must react faster than by polling [`Progress`].

@@ -68,6 +68,12 @@ pub fn run(args: &VerifyArgs, global: &Global, terminal: &Terminal) -> Result<()
         (Some(path), Some(n)) => format!("compared with {}, {n} passes", path.display()),
         _ => "bed, beam and modes only: there is no sheet to compare with".into(),
     };
+    if verdict.passed() && verdict.burnt_mm == 0.0 {
+        return Err(Failure::No(format!(
+            "{}: it burns nothing",
+            args.job.display()
+        )));
+    }
     if verdict.passed() {
         if global.json {
             return Ok(());

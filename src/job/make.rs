@@ -84,6 +84,7 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         machine: &machine,
     };
     check_sizing(request.sizing)?;
+    check_ranges(request.accept_distance, &stock)?;
 
     progress.start("reading the surface", None);
     let loaded = load(request)?;
@@ -94,8 +95,8 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
 
     // Only a sheet that passes is turned into anything that a machine could run.
     let mut job = None;
-    if shape.verdict.pass {
-        let cut = cut(&shape.sheet, &machine, &material, &setting, progress)?;
+    if let Some(sheet) = shape.sheet.as_ref().filter(|_| shape.verdict.pass) {
+        let cut = cut(sheet, &machine, &material, &setting, progress)?;
         shape
             .verdict
             .reasons
@@ -108,7 +109,11 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     let design = decided(request, folder, &loaded, &shape, &stock);
     let figures = tell::figures(&design, &loaded, &shape, job.as_ref(), &warnings);
     let summary = tell::summary(&material, &machine, &shape, job.as_ref(), stock.sigma);
-    let drawing = job.as_ref().map(|_| pattern::svg(&shape.sheet));
+    let drawing = shape
+        .sheet
+        .as_ref()
+        .filter(|_| job.is_some())
+        .map(pattern::svg);
     let strokes = job.as_ref().map(|job| drawn(&job.toolpath));
     let edge_mm = shape.flat.edge_mm;
     let distances: Vec<f64> = shape
@@ -228,6 +233,29 @@ fn checked_sigma(sigma: f64) -> Result<f64, MakeError> {
     } else {
         Err(MakeError::Sigma { sigma })
     }
+}
+
+fn check_ranges(accept_distance: f64, stock: &Stock<'_>) -> Result<(), MakeError> {
+    for (what, value, least, most) in [
+        ("--accept-distance", accept_distance, 0.0, 100.0),
+        (
+            "the hinge width (--hinge)",
+            stock.hinge_width_mm,
+            0.01,
+            100.0,
+        ),
+        ("the width of the cut (--kerf)", stock.kerf_mm, 0.01, 20.0),
+    ] {
+        if !(least..=most).contains(&value) {
+            return Err(MakeError::Range {
+                what,
+                value,
+                least,
+                most,
+            });
+        }
+    }
+    Ok(())
 }
 
 fn check_sizing(sizing: Sizing) -> Result<(), MakeError> {

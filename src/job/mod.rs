@@ -67,6 +67,18 @@ pub enum MakeError {
         /// What could be given.
         example: &'static str,
     },
+    /// A number outside its range.
+    #[error("{what} is {value}; it must lie between {least} and {most}")]
+    Range {
+        /// What it is.
+        what: &'static str,
+        /// As given.
+        value: f64,
+        /// The smallest value.
+        least: f64,
+        /// The largest value.
+        most: f64,
+    },
     /// A cone at a vertex that does not exist.
     #[error("--cone v{vertex}: there is no such vertex, the surface has v1 to v{count}")]
     NoSuchVertex {

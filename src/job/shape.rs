@@ -7,11 +7,11 @@ use nalgebra::{Point2, Point3};
 
 use super::MakeError;
 use super::load::Loaded;
-use super::request::Request;
+use super::request::{ConeWish, Request};
 use super::verdict::{Verdict, place};
 use crate::base::progress::Progress;
 use crate::base::units::short;
-use crate::conformal::{ConeRequest, FlattenOptions, Flattened, Sizing, flatten};
+use crate::conformal::{Cone, ConeRequest, FlattenOptions, Flattened, Sizing, flatten};
 use crate::linkage::{Built, Linkage, LinkageOptions, build};
 use crate::machine::Machine;
 use crate::mesh::{ClosestPoint, Surface};
@@ -38,8 +38,8 @@ pub(crate) struct Shape {
     pub built: Built,
     /// Triangles removed at the cone.
     pub removed: usize,
-    /// The sheet in its place on the bed.
-    pub sheet: Sheet,
+    /// The sheet in its place on the bed; none if triangles lie on one another.
+    pub sheet: Option<Sheet>,
     /// The linkage with its flat positions there.
     pub linkage: Linkage,
     /// The layout's corners there, by face.
@@ -95,57 +95,63 @@ struct Map {
     removal: usize,
 }
 
-/// The maps worth trying, the most promising first: one, unless the number of triangles to remove is open and there
-/// is a cone.
+/// The maps worth trying, the most promising first. With cones left to the program: without one, and, if that leaves
+/// [1, σ], with one at the vertex of largest λ; with the number of triangles to remove left open: each of
+/// [`REMOVALS`].
 fn maps(
     request: &Request,
     loaded: &Loaded,
     sigma: f64,
     progress: &dyn Progress,
 ) -> Result<Vec<Map>, MakeError> {
-    let removals: Vec<usize> = match (request.remove_at_cone, &loaded.cones) {
-        (Some(count), _) => vec![count],
-        (None, ConeRequest::Given(cones)) if cones.iter().all(|c| c.units <= 0) => vec![0],
-        (None, _) => REMOVALS.to_vec(),
-    };
-    let mut maps = Vec::new();
-    for removal in removals {
+    let surface = &loaded.import.surface;
+    let map = |cones: &[Cone], removal: usize| -> Result<Map, MakeError> {
         progress.start("conformal map", None);
         let options = FlattenOptions {
             sigma,
-            cones: loaded.cones.clone(),
+            cones: ConeRequest::Given(cones.to_vec()),
             sizing: request.sizing,
             cone_clearance: clearance(removal),
         };
-        let flat =
-            flatten(&loaded.import.surface, &options, progress).map_err(MakeError::Conformal)?;
-        let coned = !flat.layout.cones.is_empty();
-        let within = flat.scale.max <= sigma;
-        // Without a cone there is nothing to remove, and one such map is enough.
-        let known = maps.iter().any(|m: &Map| m.removal == 0);
-        if coned || !known {
-            let removal = if coned { removal } else { 0 };
-            maps.push(Map {
-                flat,
-                options,
-                removal,
-            });
-        }
-        if within && !coned {
-            break;
-        }
-    }
-    // A map within σ comes first, the one that removes least of those; then by what lies inside.
-    let fits = |map: &Map| map.flat.scale.max <= sigma;
-    maps.sort_by(|a, b| {
-        fits(b).cmp(&fits(a)).then_with(|| {
-            if fits(a) {
-                a.removal.cmp(&b.removal)
-            } else {
-                b.flat.scale.inside.total_cmp(&a.flat.scale.inside)
-            }
+        let flat = flatten(surface, &options, progress).map_err(MakeError::Conformal)?;
+        Ok(Map {
+            flat,
+            options,
+            removal,
         })
-    });
+    };
+    let removals = |cones: &[Cone]| match request.remove_at_cone {
+        _ if cones.is_empty() => vec![0],
+        Some(count) => vec![count],
+        None if cones.iter().all(|c| c.units <= 0) => vec![0],
+        None => REMOVALS.to_vec(),
+    };
+    let mut maps = Vec::new();
+    let cones = match &loaded.cones {
+        ConeRequest::Given(cones) => cones.clone(),
+        ConeRequest::Auto => {
+            let plain = map(&[], 0)?;
+            let (needed, vertex) = (plain.flat.scale.max, plain.flat.scale.max_vertex);
+            maps.push(plain);
+            if needed <= sigma || surface.on_rim(vertex) {
+                return Ok(maps);
+            }
+            vec![Cone { vertex, units: 1 }]
+        }
+    };
+    for removal in removals(&cones) {
+        maps.push(map(&cones, removal)?);
+    }
+    // A map within σ comes first, the one that removes least of those; else the one that leaves least of the surface
+    // outside. The sort is stable.
+    let outside = |map: &Map| {
+        if map.flat.scale.max <= sigma {
+            0.0
+        } else {
+            1.0 - map.flat.scale.inside
+        }
+    };
+    maps.sort_by(|a, b| outside(a).total_cmp(&outside(b)));
     Ok(maps)
 }
 
@@ -160,13 +166,20 @@ fn attempt(
     let (flat, built) = lay_out(request, surface, &map, stock.sigma, progress)?;
     progress.note(&describe_map(&flat, surface, stock.sigma));
     // The sheet depends on flat positions only: what does not fit the bed is known before the long solve.
-    let sheet = Sheet::new(&built.linkage, stock.hinge_width_mm, stock.kerf_mm)
-        .map_err(MakeError::Pattern)?;
-    let (sheet, motion) =
-        pattern::placed(&sheet, stock.machine, request.mirror).map_err(MakeError::Pattern)?;
-    let moved = |p: Point2<f64>| {
-        let (x, y) = motion.apply(p.x, p.y);
-        Point2::new(x, y)
+    let (mut sheet, mut motion) = (None, None);
+    if built.overlaps.is_empty() {
+        let drawn = Sheet::new(&built.linkage, stock.hinge_width_mm, stock.kerf_mm)
+            .map_err(MakeError::Pattern)?;
+        let (placed, how) =
+            pattern::placed(&drawn, stock.machine, request.mirror).map_err(MakeError::Pattern)?;
+        (sheet, motion) = (Some(placed), Some(how));
+    }
+    let moved = |p: Point2<f64>| match &motion {
+        Some(motion) => {
+            let (x, y) = motion.apply(p.x, p.y);
+            Point2::new(x, y)
+        }
+        None => p,
     };
     let mut linkage = built.linkage.clone();
     linkage
@@ -192,6 +205,7 @@ fn attempt(
         surface,
         built.overlaps.len(),
         request.accept_distance,
+        request.cones == ConeWish::Auto,
     );
     Ok(Shape {
         flat,

@@ -9,6 +9,7 @@ use super::shape::Shape;
 use crate::base::units::short;
 use crate::machine::Machine;
 use crate::material::{Material, Source as SigmaSource};
+use crate::pattern::Sheet;
 
 /// What does not forbid the cut but should be known before it.
 pub(crate) fn warnings(
@@ -27,7 +28,7 @@ pub(crate) fn warnings(
         .collect();
     if sigma > material.sigma.max {
         warnings.push(format!(
-            "σ = {} was asked for, but {} is known to stretch only to {} ({}): hinges are likely to tear. Cut a small trial first",
+            "σ = {} was asked for, but the profile {} says {} ({}): hinges are likely to tear. Cut a small trial first",
             short(sigma, 3),
             material.name,
             short(material.sigma.max, 3),
@@ -57,8 +58,12 @@ pub(crate) fn warnings(
     }
     if built.lost > 0 {
         warnings.push(format!(
-            "{} triangles at the rim hang by fewer than two others and were left out",
-            built.lost
+            "at the rim {} hanging by fewer than two others left out",
+            if built.lost == 1 {
+                "1 triangle was".into()
+            } else {
+                format!("{} triangles were", built.lost)
+            }
         ));
     }
     if built.seam_edges > 0 {
@@ -86,20 +91,22 @@ pub(crate) fn summary(
     cut: Option<&CutResult>,
     sigma: f64,
 ) -> Vec<(String, String)> {
-    let (sheet, quality, flat) = (&shape.sheet, &shape.quality, &shape.flat);
-    let figures = sheet.figures();
+    let (quality, flat) = (&shape.quality, &shape.flat);
     let mut lines = vec![
         ("Material".to_owned(), material.title.clone()),
         ("Machine".to_owned(), machine.title.clone()),
-        (
+    ];
+    if let Some(sheet) = &shape.sheet {
+        let figures = sheet.figures();
+        lines.push((
             "Sheet".to_owned(),
             format!(
                 "{} × {} mm",
                 short(figures.width_mm, 0),
                 short(figures.height_mm, 0)
             ),
-        ),
-        (
+        ));
+        lines.push((
             "Pattern".to_owned(),
             format!(
                 "{} triangles of {} mm, {} slits, hinges {} mm wide, cut {} mm wide",
@@ -109,7 +116,9 @@ pub(crate) fn summary(
                 short(sheet.metadata.hinge_width_mm, 2),
                 short(sheet.metadata.kerf_mm, 2),
             ),
-        ),
+        ));
+    }
+    lines.extend([
         (
             "Hinges open".to_owned(),
             format!(
@@ -121,13 +130,16 @@ pub(crate) fn summary(
         ),
         (
             "Distance from the surface".to_owned(),
-            format!(
-                "at most {} mm ({} of a triangle edge)",
-                short(quality.distance_max.value * quality.edge_mm, 3),
-                short(quality.distance_max.value, 4),
-            ),
+            match quality.distance_max.value * quality.edge_mm {
+                mm if mm < 0.001 => "under 0.001 mm".to_owned(),
+                mm => format!(
+                    "at most {} mm ({} of a triangle edge)",
+                    short(mm, 3),
+                    short(quality.distance_max.value, 4),
+                ),
+            },
         ),
-    ];
+    ]);
     if let Some(cut) = cut {
         lines.push((
             "Job".to_owned(),
@@ -171,7 +183,7 @@ pub(crate) fn figures(
             .copied()
             .unwrap_or(1.0)
     };
-    let s = shape.sheet.figures();
+    let sheet = shape.sheet.as_ref().map(Sheet::figures);
     json!({
         "verdict": shape.verdict,
         "warnings": warnings,
@@ -204,7 +216,7 @@ pub(crate) fn figures(
         },
         "solve": { "steps": shape.effort.steps, "factorizations": shape.effort.factorizations },
         "quality": shape.quality,
-        "sheet": {
+        "sheet": sheet.map(|s| json!({
             "slits": s.slits,
             "stars": s.stars,
             "contours": s.contours,
@@ -213,7 +225,7 @@ pub(crate) fn figures(
             "area_mm2": s.area_mm2,
             "width_mm": s.width_mm,
             "height_mm": s.height_mm,
-        },
+        })),
         "job": cut.map(CutResult::figures),
     })
 }

@@ -37,13 +37,15 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Judges by the figures; `accept_distance` in L, `flat_overlaps` pairs of triangles that overlap on the sheet.
+    /// Judges by the figures; `accept_distance` in L, `flat_overlaps` pairs of triangles that overlap on the sheet,
+    /// `cone_tried` true if the program was free to place a cone.
     pub fn judge(
         quality: &Quality,
         flat: &Flattened,
         surface: &Surface,
         flat_overlaps: usize,
         accept_distance: f64,
+        cone_tried: bool,
     ) -> Self {
         let mut reasons: Vec<Reason> = Vec::new();
         let mut say = |at_mm: Option<[f64; 3]>, text: String| reasons.push(Reason { text, at_mm });
@@ -57,7 +59,7 @@ impl Verdict {
                     short(q.distance_max.value * q.edge_mm, 1),
                     place(q.distance_max.at_mm.into()),
                     short(accept_distance, 2),
-                    stretch_advice(flat, surface, q.sigma),
+                    stretch_advice(flat, surface, q.sigma, cone_tried),
                 ),
             );
         }
@@ -70,7 +72,7 @@ impl Verdict {
                     short(q.sigma, 3),
                     short(q.opening[2], 4),
                     place(q.opening_max.at_mm.into()),
-                    stretch_advice(flat, surface, q.sigma),
+                    stretch_advice(flat, surface, q.sigma, cone_tried),
                 ),
             );
         }
@@ -89,7 +91,7 @@ impl Verdict {
             say(
                 q.intersection_at.map(|w| w.at_mm),
                 format!(
-                    "{} pairs of triangles cross each other in space{}: the surface bends too sharply for triangles of {} mm; use smaller ones, or place a cone there",
+                    "{} pairs of triangles cross each other in space{}: the surface bends too sharply for triangles of {} mm; use smaller ones (--triangles or --edge), or place a cone there",
                     q.intersections,
                     q.intersection_at.map_or_else(String::new, |w| format!(
                         ", one at {}",
@@ -112,7 +114,7 @@ impl Verdict {
             say(
                 None,
                 format!(
-                    "triangle edges are wrong by up to {:.1e} of their length, {EDGE_TOLERANCE:.0e} is allowed: a rigid sheet would not take this shape. Use the exact solver (--solver exact), smaller triangles, or a material with a larger σ",
+                    "triangle edges are wrong by up to {:.1e} of their length, {EDGE_TOLERANCE:.0e} is allowed: a rigid sheet would not take this shape. Use --solver exact if you did not, smaller triangles, or a material with a larger σ",
                     q.edge_error_max
                 ),
             );
@@ -121,7 +123,7 @@ impl Verdict {
             say(
                 None,
                 format!(
-                    "{flat_overlaps} pairs of triangles lie on one another on the flat sheet: it cannot be cut from one piece. A cone of negative curvature needs a cut through it, which is not supported yet"
+                    "{flat_overlaps} pairs of triangles lie on one another on the flat sheet: it cannot be cut from one piece. Place the cone elsewhere (--cone X,Y,Z); a cone of negative curvature needs a cut through it, which is not supported yet"
                 ),
             );
         }
@@ -153,25 +155,28 @@ pub(crate) fn place(p: Point3<f64>) -> String {
 }
 
 /// What the conformal map says about stretching: how much would be needed, where, and what helps.
-fn stretch_advice(flat: &Flattened, surface: &Surface, sigma: f64) -> String {
+fn stretch_advice(flat: &Flattened, surface: &Surface, sigma: f64, cone_tried: bool) -> String {
     let needed = flat.scale.max / flat.scale.min;
     if needed <= sigma + SIGMA_TOLERANCE {
-        return "σ would suffice for the smooth surface, so the triangles are too large for its detail: use smaller ones".into();
+        return "σ would suffice for the smooth surface, so the triangles are too large for its detail: use smaller ones (--triangles or --edge)".into();
     }
     let vertex = flat.scale.max_vertex;
     let at = surface.position(vertex);
-    let cone = if flat.layout.cones.is_empty() {
+    let help = if !flat.layout.cones.is_empty() {
+        "another place for the cone (--cone X,Y,Z) or a material with a larger σ may help"
+            .to_owned()
+    } else if cone_tried {
+        "a cone there was tried and does not do better; a material with a larger σ, a gentler surface, or a cone elsewhere (--cone X,Y,Z) may help".to_owned()
+    } else {
         format!(
-            "a cone there (--cone auto, or --cone {},{},{})",
+            "a cone there (--cone auto, or --cone {},{},{}) or a material with a larger σ may help",
             short(at.x, 1),
             short(at.y, 1),
             short(at.z, 1)
         )
-    } else {
-        "another place for the cone (--cone X,Y,Z)".into()
     };
     format!(
-        "The surface asks for a stretch of {} at {}, σ is {}: {cone} or a material with a larger σ may help",
+        "The surface asks for a stretch of {} at {}, σ is {}: {help}",
         short(needed, 2),
         place(at),
         short(sigma, 3),

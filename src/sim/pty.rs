@@ -62,7 +62,7 @@ const STRIDE_S: f64 = 0.05;
 pub struct Link(PathBuf);
 
 impl Link {
-    /// Makes a symbolic link to a pseudo-terminal; a link that is there already is replaced, anything else is not.
+    /// Makes a symbolic link to a pseudo-terminal; a link to one that is there already is replaced, anything else is not.
     ///
     /// # Errors
     /// [`PtyError::Link`].
@@ -71,7 +71,11 @@ impl Link {
             path: path.to_path_buf(),
             source,
         };
-        if path.symlink_metadata().is_ok_and(|m| m.is_symlink()) {
+        // A link that an earlier run left; a person's own link to something else stays.
+        if path
+            .read_link()
+            .is_ok_and(|old| old.starts_with("/dev/pts"))
+        {
             std::fs::remove_file(path).map_err(failed)?;
         }
         #[cfg(unix)]
