@@ -70,6 +70,9 @@ pub struct Layout {
     pub cut: Vec<HalfedgeId>,
     /// Largest relative error of a flat edge length against the metric: how well the unfolding closed.
     pub closure: f64,
+    /// How far the two sides of the cut are from being each other's image under the seam transitions, millimetres:
+    /// rounding, gathered on the way around the cone.
+    pub seam_gap_mm: f64,
 }
 
 /// The range of λ over a layout.
@@ -144,6 +147,7 @@ impl Layout {
             cones: cones.to_vec(),
             cut: cut.to_vec(),
             closure: 0.0,
+            seam_gap_mm: 0.0,
         };
         layout.closure = layout.closure_error(surface, metric);
         let centre = match cones.first() {
@@ -170,6 +174,7 @@ impl Layout {
             .for_each(|p| p.coords *= factor);
         layout.seam.values_mut().for_each(|t| t.shift *= factor);
         layout.log_scale.iter_mut().for_each(|x| *x -= factor.ln());
+        layout.seam_gap_mm *= factor;
         layout
     }
 
@@ -338,6 +343,10 @@ impl Layout {
                 turn,
                 shift: Complex::new(0.0, 0.0),
             };
+            let gap = (there.apply(a) - ta)
+                .norm()
+                .max((there.apply(b) - tb).norm());
+            self.seam_gap_mm = self.seam_gap_mm.max(gap);
             self.seam.insert(h, there);
             self.seam.insert(twin, there.inverse());
         }

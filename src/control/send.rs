@@ -920,11 +920,11 @@ impl Sender<'_> {
     ///
     /// An error in the first half (the hold) does not end it: the reset is what puts the beam out.
     fn stop_sequence(&mut self, trusted: bool) -> io::Result<Proof> {
-        let (stood, undisturbed) = match self.link.send(b"!").and_then(|()| self.wait_until_still())
-        {
-            Ok(seen) => seen,
-            Err(_) => (false, false),
-        };
+        let (stood, undisturbed) = self
+            .link
+            .send(b"!")
+            .and_then(|()| self.wait_until_still())
+            .unwrap_or_default();
         // Also when it does not stand: in motion a reset puts the beam out at once.
         let mut banner = false;
         let mut failure = None;

@@ -26,7 +26,9 @@ pub(crate) struct Laid {
     pub neighbours: [Option<(usize, usize)>; 3],
 }
 
-/// Closer than this (in L) counts as the same place. The walk's rounding errors are 10⁻¹² of the layout's size.
+/// Closer than this (in L) counts as the same place, or than a few times the seam's gap if that is more: a symmetric
+/// mesh has its cut on a line of lattice centroids, and each must be met on one side of it exactly. The walk's own
+/// rounding errors are 10⁻¹² of the layout's size.
 const TOLERANCE: f64 = 1e-9;
 
 /// All lattice triangles with their three corners on the surface, with their neighbours, by face and key.
@@ -40,7 +42,7 @@ pub(crate) fn lay(
     let walker = Walker {
         surface,
         layout,
-        tolerance_mm: TOLERANCE * edge_mm,
+        tolerance_mm: (TOLERANCE * edge_mm).max(4.0 * layout.seam_gap_mm),
     };
     let entries = centroids(&walker, lattice);
     let index: HashMap<(FaceId, Key), usize> =
