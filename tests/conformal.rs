@@ -131,6 +131,35 @@ fn unfolding_closes_with_and_without_a_cone() {
     }
 }
 
+/// Rounding errors of the unfolding add up, they do not multiply: a mesh ten times finer still closes.
+#[test]
+fn a_fine_mesh_unfolds_as_well_as_a_coarse_one() {
+    for faces in [5_000, 100_000] {
+        let mask = sample(&format!("mask:faces={faces}"));
+        let tip = mask
+            .positions()
+            .ids()
+            .max_by(|a, b| mask.position(*a).z.total_cmp(&mask.position(*b).z))
+            .unwrap();
+        let options = FlattenOptions {
+            sigma: 2.0,
+            cones: ConeRequest::Given(vec![Cone {
+                vertex: tip,
+                units: 1,
+            }]),
+            sizing: Sizing::Triangles(500.0),
+            cone_clearance: 1.1,
+        };
+        let layout = flatten(&mask, &options, &Silent).unwrap().layout;
+        assert!(layout.closure < 1e-9, "{faces}: {:e}", layout.closure);
+        assert!(
+            layout.seam_gap_mm < 1e-9,
+            "{faces}: {:e}",
+            layout.seam_gap_mm
+        );
+    }
+}
+
 /// Same input, same bits: the solver's state from an earlier solve leaves no trace.
 #[test]
 fn a_reused_solver_gives_the_same_bits() {

@@ -53,7 +53,7 @@ impl Metric {
 
 /// Angles of the triangle with these side lengths and their cotangents, at the corner opposite each side. A broken
 /// triangle has angle π opposite the side that is too long, 0 elsewhere, and no cotangents.
-fn angles(lengths: [f64; 3]) -> ([f64; 3], [f64; 3], bool) {
+pub(super) fn angles(lengths: [f64; 3]) -> ([f64; 3], [f64; 3], bool) {
     let [a, b, c] = lengths;
     // Kahan: the two near-equal lengths are subtracted first, which is exact, so that needles keep their digits.
     let slack = |x: f64, y: f64, z: f64| (y.max(z) - x) + y.min(z);
