@@ -182,7 +182,7 @@ impl Words {
         while at < line.len() {
             let (letter, value) = next_word(line, &mut at)?;
             match letter {
-                b'G' => words.g((value * 10.0).round())?,
+                b'G' => words.g(value)?,
                 b'M' => words.m(value)?,
                 b'F' | b'I' | b'J' | b'K' | b'L' | b'N' | b'P' | b'R' | b'S' | b'T' | b'X'
                 | b'Y' | b'Z' => {
@@ -201,17 +201,14 @@ impl Words {
         Ok(words)
     }
 
-    fn g(&mut self, tenfold: f64) -> Result<(), u8> {
-        if !(0.0..=999.0).contains(&tenfold) {
-            return Err(20);
-        }
-        // In range and integral, as just checked and rounded.
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "checked above"
-        )]
-        let code = tenfold as u16;
+    fn g(&mut self, value: f64) -> Result<(), u8> {
+        let (number, hundredths) = command(value);
+        let code = match (number, hundredths) {
+            (_, 0) => u16::from(number) * 10,
+            (91 | 92, 10) => u16::from(number) * 10 + 1,
+            (0..=4 | 10 | 17..=21 | 40 | 53..=59 | 80 | 93 | 94, _) => return Err(23),
+            _ => return Err(20),
+        };
         match code {
             0 | 10 | 20 | 30 | 800 => {
                 self.group(1)?;
@@ -248,18 +245,10 @@ impl Words {
     }
 
     fn m(&mut self, value: f64) -> Result<(), u8> {
-        if value.fract() != 0.0 {
+        let (code, hundredths) = command(value);
+        if hundredths != 0 {
             return Err(23);
         }
-        if !(0.0..=255.0).contains(&value) {
-            return Err(20);
-        }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "checked above"
-        )]
-        let code = value as u8;
         match code {
             0 | 2 | 30 => {
                 self.group(9)?;
@@ -284,6 +273,22 @@ impl Words {
         }
         Ok(())
     }
+}
+
+/// The number of a G or M word as the firmware takes it apart: the whole part in one byte, which wraps (`M259` is
+/// `M3`), and the fraction in rounded hundredths (`M3.004` is `M3`). Single precision, as on the controller.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "brought into range first; single precision is the point"
+)]
+fn command(value: f64) -> (u8, u8) {
+    let value = value as f32;
+    let hundredths = (100.0 * value.fract()).round();
+    (
+        value.trunc().rem_euclid(256.0) as u8,
+        hundredths.rem_euclid(256.0) as u8,
+    )
 }
 
 /// Interprets one line (no spaces, no comments, upper case): changes `modal` and appends what is to be done, or leaves

@@ -109,7 +109,10 @@ pub struct Controller {
     // Motion.
     queue: Queue<Cut>,
     running: Option<Running>,
+    /// Where the head is as the controller believes.
     position: [f64; 3],
+    /// Where its zero lies on the bed: a controller that starts anew calls the place where the head stands zero.
+    zero: [f64; 3],
     soft_limit_hit: bool,
     held_since_s: f64,
     // The beam.
@@ -149,6 +152,7 @@ impl Controller {
             reports: 0,
             running: None,
             position: [0.0; 3],
+            zero: [0.0; 3],
             soft_limit_hit: false,
             held_since_s: 0.0,
             bed: Bed::default(),
@@ -174,9 +178,19 @@ impl Controller {
         &self.settings
     }
 
-    /// Where the head is, machine coordinates, mm.
+    /// Where the head is as the controller reports it, machine coordinates, mm.
     pub fn position_mm(&self) -> [f64; 3] {
         self.whereabouts().0
+    }
+
+    /// Where the head really is on the bed, mm: differs from [`Self::position_mm`] after a [`Self::power_up`] away from
+    /// zero, until the machine is homed.
+    pub fn head_mm(&self) -> [f64; 3] {
+        self.on_bed(self.position_mm())
+    }
+
+    fn on_bed(&self, place: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|k| self.zero[k] + place[k])
     }
 
     /// True if the beam is on.
@@ -186,7 +200,7 @@ impl Controller {
 
     /// Everything that was burnt until now, in order.
     pub fn burns(&self) -> Vec<Burn> {
-        self.bed.burns(self.now_s, self.position_mm())
+        self.bed.burns(self.now_s, self.head_mm())
     }
 
     /// Bytes that found the receive buffer full, or the controller deaf. Real firmware does not know this number.
@@ -265,7 +279,8 @@ impl Controller {
                 ..
             }) = self.actions.front()
         {
-            next = next.min(*until);
+            // A dwell that is over is only noticed once the main program is free again.
+            next = next.min(until.max(self.busy_until_s));
         }
         next
     }
@@ -308,13 +323,16 @@ impl Controller {
         self.state = State::Critical;
     }
 
-    /// As when the port is opened and DTR toggles: the controller starts anew, without an alarm.
+    /// As when the port is opened and DTR toggles: the controller starts anew, without an alarm. The head stays where it
+    /// is, but the controller has forgotten where that is, and calls it zero.
     pub fn power_up(&mut self) {
         self.incoming.clear();
         self.outgoing.clear();
         self.outgoing_free_s = self.now_s;
         self.incoming_free_s = self.now_s;
-        self.position = self.position_mm();
+        self.stop_motion();
+        self.zero = self.head_mm();
+        self.position = [0.0; 3];
         self.restart();
         self.state = if self.settings.homing {
             State::Alarm
@@ -687,8 +705,7 @@ impl Controller {
             spindle: cut.drive.spindle,
             rapid: cut.drive.rate_mm_min.is_none(),
         };
-        let at = self.whereabouts().0;
-        self.bed.light(self.now_s, at, light);
+        self.bed.light(self.now_s, self.head_mm(), light);
         // What the output is left at when the machine comes to rest after this block.
         let dark = self.settings.laser_mode && light.spindle == Spindle::Dynamic;
         self.at_rest = if dark {
@@ -704,7 +721,8 @@ impl Controller {
     /// The output while standing, from now.
     fn rest(&mut self, light: Light) {
         self.at_rest = light;
-        self.bed.light(self.now_s, self.position, light);
+        let head = self.on_bed(self.position);
+        self.bed.light(self.now_s, head, light);
     }
 
     /// The running profile has ended: on to the next block, or to rest.
@@ -824,7 +842,8 @@ impl Controller {
         } else {
             self.at_rest
         };
-        self.bed.light(self.now_s, self.position, light);
+        let head = self.on_bed(self.position);
+        self.bed.light(self.now_s, head, light);
         self.idle_delay();
     }
 
@@ -860,7 +879,8 @@ impl Controller {
             } else {
                 self.before_hold
             };
-            self.bed.light(self.now_s, self.position, light);
+            let head = self.on_bed(self.position);
+            self.bed.light(self.now_s, head, light);
         }
     }
 

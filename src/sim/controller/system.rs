@@ -110,6 +110,7 @@ impl Controller {
                 -pull
             }
         });
+        self.zero = [0.0; 3];
         self.modal.position = self.position;
         self.state = State::Idle;
         self.idle_delay();

@@ -346,3 +346,72 @@ fn the_same_bytes_give_the_same_burns_however_the_clock_is_advanced() {
     assert!(whole.len() > 50, "{}", whole.len());
     assert_eq!(whole, run(0.013));
 }
+
+#[test]
+fn a_dwell_that_ends_while_a_short_hold_still_blocks_the_program_is_over() {
+    let mut b = Bench::laser();
+    b.send("G4P0.05\n", 0.04);
+    b.raw(b'!', 0.0025);
+    b.raw(b'~', 1.0);
+    assert_eq!(b.said, b"ok\r\n");
+}
+
+#[test]
+fn a_restarted_controller_calls_the_place_of_the_head_zero_and_burns_where_the_head_is() {
+    let mut b = Bench::laser();
+    b.send("G21G90\nG0X30Y20\n", 5.0);
+    b.machine.power_up();
+    b.wait(0.1);
+    assert_eq!(b.machine.position_mm(), [0.0; 3]);
+    assert_eq!(b.machine.head_mm(), [30.0, 20.0, 0.0]);
+    let report = b.raw(b'?', 0.1);
+    assert!(report.contains("MPos:0.000,0.000,0.000"), "{report}");
+    b.send("M4S500\nG1X10F600\nM5\n", 5.0);
+    assert_eq!(b.machine.position_mm(), [10.0, 0.0, 0.0]);
+    let burns = b.machine.burns();
+    let (first, last) = (burns[0].from_mm, burns[burns.len() - 1].to_mm);
+    assert_eq!((first[0], first[1]), (30.0, 20.0));
+    assert_eq!((last[0], last[1]), (40.0, 20.0));
+}
+
+#[test]
+fn homing_finds_the_true_place_again() {
+    let mut b = Bench::new(Settings {
+        homing: true,
+        homing_seek_mm_min: 60_000.0,
+        ..Settings::default()
+    });
+    b.send("$H\n", 5.0);
+    b.send("G21G91\nG0X-20\n", 5.0);
+    b.machine.power_up();
+    assert_eq!(b.machine.position_mm(), [0.0; 3]);
+    assert_eq!(b.machine.head_mm(), [-21.0, -1.0, -1.0]);
+    b.send("$H\n", 5.0);
+    assert_eq!(b.machine.position_mm(), [-1.0; 3]);
+    assert_eq!(b.machine.head_mm(), [-1.0; 3]);
+}
+
+#[test]
+fn a_return_ends_a_line_and_a_return_with_a_newline_answers_twice() {
+    let mut b = Bench::laser();
+    assert_eq!(b.send("G0X1\r\n", 1.0), "ok\r\nok\r\n");
+    assert_eq!(b.send("G0X2\rY3\r", 1.0), "ok\r\nok\r\n");
+    assert_eq!(b.machine.position_mm(), [2.0, 3.0, 0.0]);
+}
+
+#[test]
+fn a_command_number_is_taken_apart_as_the_firmware_does() {
+    for word in ["M3.004", "M2.996", "M259"] {
+        let mut b = Bench::laser();
+        let said = b.send(&format!("G1F600\n{word}S500\n"), 1.0);
+        let fine = said == "ok\r\nok\r\n";
+        assert_eq!(fine, word != "M2.996", "{word}: {said:?}");
+        assert_eq!(b.machine.beam_on(), fine, "{word}");
+    }
+    let mut b = Bench::laser();
+    assert_eq!(
+        b.send("M3.01\nG1.5X1\nG28.2\n", 1.0),
+        "error:23\r\nerror:23\r\nerror:20\r\n"
+    );
+    assert_eq!(b.send("G91.1\nG92X0\nG92.1\n", 1.0), "ok\r\nok\r\nok\r\n");
+}
