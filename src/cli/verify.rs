@@ -23,7 +23,7 @@ pub struct VerifyArgs {
     /// The machine's profile [default: the one that the job's header names, or the standard one]
     #[arg(long, value_name = "NAME|FILE")]
     machine: Option<String>,
-    /// How often each cut must be gone over [default: taken from the job, then demanded everywhere]
+    /// How often each cut must be gone over [default: as the job's header says, or once]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     passes: Option<u32>,
 }

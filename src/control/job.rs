@@ -34,6 +34,36 @@ pub enum JobError {
         /// The byte.
         byte: u8,
     },
+    /// Not ASCII.
+    #[error(
+        "line {line} holds the byte 0x{byte:02x}, which is not ASCII, and which a controller may obey the moment it arrives, also in a comment: write the line without umlauts, accents and symbols. Nothing was sent"
+    )]
+    NotAscii {
+        /// Line number, from 1.
+        line: usize,
+        /// The byte.
+        byte: u8,
+    },
+    /// A carriage return that no newline follows.
+    #[error(
+        "line {line} holds a carriage return that no newline follows: the controller would read two lines, other programs one. Save the file with line ends \\n or \\r\\n. Nothing was sent"
+    )]
+    LoneReturn {
+        /// Line number, from 1.
+        line: usize,
+    },
+    /// A wait longer than any job needs.
+    #[error(
+        "line {line} waits for {seconds} s (G4 P is in seconds), and a job may wait {limit} s at a time: while the machine waits nobody can tell it from one that has died. Write a shorter wait. Nothing was sent"
+    )]
+    Dwell {
+        /// Line number, from 1.
+        line: usize,
+        /// How long, s.
+        seconds: f64,
+        /// The limit, s.
+        limit: f64,
+    },
     /// A character that a controller takes out of the stream and obeys at once.
     #[error(
         "line {line} holds {character:?}, which the controller obeys the moment it arrives, and which no job may hold: remove it. Nothing was sent"
@@ -94,6 +124,12 @@ pub enum JobError {
     },
 }
 
+/// The longest G4, s. The sender waits so long for an answer before it calls the link dead.
+const LONGEST_DWELL_S: f64 = 600.0;
+
+/// Digits that GRBL reads of a number; it takes the others for zeros, leading zeros included: `M000000005` is M0.
+const DIGITS: usize = 8;
+
 /// Lines that are ready to be sent: no comments, no blanks, upper case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Job {
@@ -119,8 +155,17 @@ impl Job {
             longest_dwell_s: 0.0,
         };
         let mut beam_on = None;
-        for (index, raw) in text.split(|&b| b == b'\n').enumerate() {
+        let mut rows = text.split(|&b| b == b'\n').enumerate().peekable();
+        while let Some((index, row)) = rows.next() {
             let line = index + 1;
+            // A return belongs to the newline after it, and the last row has none.
+            let raw = match row {
+                [head @ .., b'\r'] if rows.peek().is_some() => head,
+                _ => row,
+            };
+            if raw.contains(&b'\r') {
+                return Err(JobError::LoneReturn { line });
+            }
             let start = job.text.len();
             strip(raw, line, &mut job.text)?;
             let kept = &job.text[start..];
@@ -147,6 +192,13 @@ impl Job {
                     return Err(JobError::ConstantPower { line });
                 }
                 job.constant_power = true;
+            }
+            if found.dwell_s > LONGEST_DWELL_S {
+                return Err(JobError::Dwell {
+                    line,
+                    seconds: found.dwell_s,
+                    limit: LONGEST_DWELL_S,
+                });
             }
             if found.off {
                 beam_on = None;
@@ -201,16 +253,18 @@ impl Job {
 
 /// Appends a line without blanks and comments, upper case.
 fn strip(raw: &[u8], line: usize, into: &mut String) -> Result<(), JobError> {
-    let mut paren = false;
+    let (mut paren, mut semicolon) = (false, false);
     for &byte in raw {
         match byte {
+            0x80.. => return Err(JobError::NotAscii { line, byte }),
             // Realtime bytes act even inside a comment, if one were sent; comments are not, but a job that holds
             // them should not be sent by other programs either. In a comment they are only text.
+            b' '..=b'~' | b'\t' if semicolon => {}
             b')' if paren => paren = false,
-            _ if paren && (byte >= 0x20 || byte == b'\t' || byte == b'\r') => {}
+            b' '..=b'~' | b'\t' if paren => {}
             b'(' => paren = true,
-            b';' => break,
-            b' ' | b'\t' | b'\r' => {}
+            b';' => semicolon = true,
+            b' ' | b'\t' => {}
             b'!' | b'~' | b'?' => {
                 return Err(JobError::Realtime {
                     line,
@@ -258,6 +312,35 @@ fn read_words(text: &str, line: usize) -> Result<Found, JobError> {
             .parse()
             .map_err(|_| wrong(word, "a letter must be followed by a number"))?;
         match letter {
+            'G' | 'M' if word.bytes().filter(u8::is_ascii_digit).count() > DIGITS => {
+                return Err(wrong(
+                    word,
+                    "a command has a number of so many digits that the controller reads another one",
+                ));
+            }
+            // The firmware keeps the whole part in a byte: M259 is M3.
+            'G' | 'M' if !(0.0..256.0).contains(&value) => {
+                return Err(wrong(word, "commands are numbered from 0 to 255"));
+            }
+            // And rounds the fraction to hundredths: M3.004 is M3.
+            'M' if value.fract() != 0.0 => {
+                return Err(wrong(word, "M commands are whole numbers"));
+            }
+            'G' if value == 10.0 || value == 28.1 || value == 30.1 => {
+                return Err(wrong(
+                    word,
+                    "this writes the controller's memory, and while it writes it loses what is sent: set the origin before the job, not in it",
+                ));
+            }
+            'G' if value.trunc() == 38.0 => {
+                return Err(wrong(
+                    word,
+                    "a laser has no probe, and a job must not move until something is touched",
+                ));
+            }
+            'G' if value.fract() != 0.0 && ![43.1, 61.1, 91.1, 92.1].contains(&value) => {
+                return Err(wrong(word, "no GRBL controller knows this command"));
+            }
             'M' => {
                 found.m3 |= value == 3.0;
                 found.on |= value == 3.0 || value == 4.0;
@@ -265,7 +348,7 @@ fn read_words(text: &str, line: usize) -> Result<Found, JobError> {
             }
             'G' => dwell |= value == 4.0,
             'S' => found.s = value,
-            'P' => p = value,
+            'P' => p = value.max(p),
             _ => {}
         }
         rest = after;
@@ -337,6 +420,92 @@ mod tests {
                 line: 1,
                 length: 93,
                 limit: 79
+            })
+        );
+    }
+
+    #[test]
+    fn commands_that_the_controller_reads_otherwise_than_written_are_refused() {
+        for job in [
+            "M3.004S500\nG1X10F100\nM5\n",
+            "M4.004S500\nG1X10F100\n",
+            "M2.99999999S5\nG1X1F100\n",
+            "M259S5\nG1X1F100\n",
+            "M4S5\nG1X1F100\nM000000005",
+            "M4S5\nG1X1F100\nM-5",
+            "G1.004X1F100",
+            "G4.5P1",
+            "G257X1F100",
+        ] {
+            let found = check(job);
+            assert!(
+                matches!(found, Err(JobError::Word { .. })),
+                "{job:?}: {found:?}"
+            );
+        }
+        assert!(check("M04.0 S5\nG01 X1.123456789 F100\nG91.1\nG92.1\nG61.1\nM05").is_ok());
+    }
+
+    #[test]
+    fn words_that_write_the_controllers_memory_or_probe_are_refused() {
+        for word in [
+            "G10L2P1X0",
+            "G10L20P1X0",
+            "G28.1",
+            "G30.1",
+            "G38.2X1F1",
+            "G38.5X1F1",
+        ] {
+            let found = check(&format!("M4S1\n{word}\nM5\n"));
+            assert!(
+                matches!(found, Err(JobError::Word { line: 2, .. })),
+                "{word}: {found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_return_without_a_newline_would_be_a_line_end_for_the_controller_only() {
+        for (job, line) in [
+            ("G1X10F100S500\rY10\rM4\rM5", 1),
+            ("G21\nG1X1 (a\rb)\n", 2),
+            ("G21\nG1X1;a\rM3\n", 2),
+            ("G21\r\r\n", 1),
+            ("G21\nG90\r", 2),
+        ] {
+            assert_eq!(check(job), Err(JobError::LoneReturn { line }), "{job:?}");
+        }
+        assert_eq!(check("G21\r\nG90\r\n\r\n").unwrap().len(), 2);
+    }
+
+    #[test]
+    fn bytes_that_a_controller_may_obey_are_refused_in_comments_too() {
+        for (job, byte) in [
+            (&b"G21\nG1X1(\x84)"[..], 0x84),
+            (b"G21\n;\xc3\xa4\n", 0xc3),
+            (b"G21\nX\xe4", 0xe4),
+        ] {
+            let found = Job::check(job, &JobRules::default());
+            assert_eq!(found, Err(JobError::NotAscii { line: 2, byte }));
+        }
+        assert_eq!(
+            check("G21 ; \u{18}"),
+            Err(JobError::Binary {
+                line: 1,
+                byte: 0x18
+            })
+        );
+    }
+
+    #[test]
+    fn a_wait_has_a_limit() {
+        assert_eq!(check("G4 P600").unwrap().longest_dwell_s(), 600.0);
+        assert_eq!(
+            check("G21\nG4 P99999"),
+            Err(JobError::Dwell {
+                line: 2,
+                seconds: 99_999.0,
+                limit: 600.0
             })
         );
     }

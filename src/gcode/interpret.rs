@@ -51,6 +51,8 @@ pub struct Program {
     pub moves: Vec<Move>,
     /// What a controller refuses or what is not safe to run, by line.
     pub findings: Vec<Finding>,
+    /// Lines with M3, whether or not anything is burnt after it.
+    pub constant_power: Vec<usize>,
     /// Lines of the text.
     pub lines: usize,
 }
@@ -61,6 +63,12 @@ const ARC_CHORD_MM: f64 = 0.002;
 const ARC_RADIUS_SLACK_MM: f64 = 0.005;
 /// Chords of one full turn at the most, however large the radius.
 const ARC_CHORDS: f64 = 20_000.0;
+/// Chords of all arcs of a text together: ten times those of a big job, 200 MB of moves. Larger counts are a mistake or
+/// an attack, and would fill the memory.
+const ALL_CHORDS: usize = 2_000_000;
+/// Ends of an arc that are closer than this without being equal: in the controller's single precision rounding decides
+/// whether it goes all the way round or hardly moves.
+const ARC_CLOSED_MM: f64 = 0.01;
 const MM_PER_INCH: f64 = 25.4;
 /// Larger numbers than any machine's, and far from where arithmetic fails: ten kilometres.
 const LARGEST_NUMBER: f64 = 1e7;
@@ -82,6 +90,8 @@ struct State {
     power: f64,
     beam: Beam,
     ended: bool,
+    /// Chords that may still be made; none once a text has asked for too many.
+    chords: Option<usize>,
 }
 
 /// Reads G-code. Never fails: what is wrong becomes a [`Finding`] with its line, and reading goes on, as a controller
@@ -96,21 +106,35 @@ pub fn read(text: &str) -> Program {
         power: 0.0,
         beam: Beam::Off,
         ended: false,
+        chords: Some(ALL_CHORDS),
     };
     let mut program = Program {
         moves: Vec::new(),
         findings: Vec::new(),
+        constant_power: Vec::new(),
         lines: 0,
     };
     for (i, raw) in text.lines().enumerate() {
         program.lines = i + 1;
         let line = i + 1;
-        match words(raw) {
-            Ok(words) if words.is_empty() => {}
-            Ok(words) => state.block(line, &words, &mut program),
-            Err(problem) => program
-                .findings
-                .push(Finding::at(line, Rule::Syntax, problem)),
+        if raw.contains('\r') {
+            program.findings.push(Finding::at(
+                line,
+                Rule::Syntax,
+                "a carriage return without a newline stands in the line: the controller ends a line there, other \
+                 programs do not"
+                    .into(),
+            ));
+        }
+        // Read as the controller does.
+        for part in raw.split('\r') {
+            match words(part) {
+                Ok(words) if words.is_empty() => {}
+                Ok(words) => state.block(line, &words, &mut program),
+                Err(problem) => program
+                    .findings
+                    .push(Finding::at(line, Rule::Syntax, problem)),
+            }
         }
     }
     if state.beam != Beam::Off && !state.ended {
@@ -187,6 +211,14 @@ struct Block {
 }
 
 impl Block {
+    /// Whether a motion is asked for, or words that only a motion takes.
+    fn moves(&self) -> bool {
+        self.motion.is_some()
+            || [self.x, self.y, self.i, self.j, self.r]
+                .iter()
+                .any(Option::is_some)
+    }
+
     fn gather(words: &[(char, f64)]) -> Result<Self, String> {
         let mut block = Self::default();
         fn once<T>(slot: &mut Option<T>, value: T, what: &str) -> Result<(), String> {
@@ -286,9 +318,15 @@ impl State {
         }
         if let Some(beam) = block.beam {
             self.beam = beam;
+            if beam == Beam::Constant {
+                program.constant_power.push(line);
+            }
         }
+        let mut say = |rule, text: String| program.findings.push(Finding::at(line, rule, text));
+        let mut stands = false;
         if block.dwell {
             if self.beam == Beam::Constant && self.power > 0.0 {
+                stands = true;
                 say(
                     Rule::StandingBeam,
                     "the machine waits (G4) with the beam on (M3)".into(),
@@ -297,22 +335,30 @@ impl State {
             if block.p.is_none() {
                 say(Rule::Syntax, "G4 without P: how long?".into());
             }
-        } else {
-            if let Some(motion) = block.motion {
-                self.motion = Some(motion);
-            }
-            if block.x.is_some() || block.y.is_some() {
-                self.travel(line, &block, unit, program);
-            } else if self.motion == Some(Motion::Line)
-                && block.motion.is_some()
-                && self.beam == Beam::Constant
-                && self.power > 0.0
-            {
+            if block.moves() {
                 say(
-                    Rule::StandingBeam,
-                    "G1 without a target turns an M3 beam on at rest".into(),
+                    Rule::Syntax,
+                    "a line both waits (G4) and moves: controllers do not agree on what that means; write two lines"
+                        .into(),
                 );
             }
+        }
+        // A controller that takes a wait and a move in one line waits first, and then moves: so it is read.
+        if let Some(motion) = block.motion {
+            self.motion = Some(motion);
+        }
+        if block.x.is_some() || block.y.is_some() {
+            self.travel(line, &block, unit, program);
+        } else if !stands
+            && self.beam == Beam::Constant
+            && self.power > 0.0
+            && self.motion.is_some_and(|motion| motion != Motion::Rapid)
+        {
+            say(
+                Rule::StandingBeam,
+                "with M3, a cutting mode (G1, G2, G3) in force and S above 0, a line without a target turns the beam on at rest"
+                    .into(),
+            );
         }
         if block.end {
             if self.beam != Beam::Off {
@@ -397,6 +443,16 @@ impl State {
             beam: self.beam,
         };
         if matches!(motion, Motion::Rapid | Motion::Line) {
+            if motion == Motion::Line
+                && from == Some(to)
+                && self.beam == Beam::Constant
+                && self.power > 0.0
+            {
+                say(
+                    Rule::StandingBeam,
+                    "a cut to where the head is anyway turns an M3 beam on at rest".into(),
+                );
+            }
             program.moves.push(step(from, to));
             return;
         }
@@ -407,10 +463,20 @@ impl State {
             );
         };
         let clockwise = motion == Motion::Clockwise;
-        match arc(from, to, block, unit, clockwise) {
-            Ok(points) => {
+        match Arc::new(from, to, block, unit, clockwise) {
+            Ok(arc) => {
+                let Some(left) = self.chords else { return };
+                self.chords = left.checked_sub(arc.chords);
+                if self.chords.is_none() {
+                    return say(
+                        Rule::Syntax,
+                        format!(
+                            "the arcs up to here need more than {ALL_CHORDS} straight pieces: from here on no arc is checked"
+                        ),
+                    );
+                }
                 let mut last = from;
-                for p in points {
+                for p in arc.points() {
                     program.moves.push(step(Some(last), p));
                     last = p;
                 }
@@ -420,59 +486,88 @@ impl State {
     }
 }
 
-/// An arc as chords, without its first point.
-fn arc(
-    from: Point,
+/// An arc that is to become chords.
+struct Arc {
     to: Point,
-    block: &Block,
-    unit: f64,
-    clockwise: bool,
-) -> Result<Vec<Point>, String> {
-    let centre = match (block.r, block.i, block.j) {
-        (Some(r), None, None) => {
-            let (r, chord) = (r * unit, to - from);
-            let half = 0.5 * chord.hypot();
-            if half == 0.0 || r == 0.0 || r.abs() < half - ARC_RADIUS_SLACK_MM {
-                return Err("an arc whose radius R does not reach its end".into());
+    centre: Point,
+    /// Radius at the start and at the end, mm.
+    radii: (f64, f64),
+    start_angle: f64,
+    sweep: f64,
+    chords: usize,
+}
+
+impl Arc {
+    fn new(
+        from: Point,
+        to: Point,
+        block: &Block,
+        unit: f64,
+        clockwise: bool,
+    ) -> Result<Self, String> {
+        let centre = match (block.r, block.i, block.j) {
+            (Some(r), None, None) => {
+                let (r, chord) = (r * unit, to - from);
+                let half = 0.5 * chord.hypot();
+                if half == 0.0 || r == 0.0 || r.abs() < half - ARC_RADIUS_SLACK_MM {
+                    return Err("an arc whose radius R does not reach its end".into());
+                }
+                let height = (r * r - half * half).max(0.0).sqrt();
+                let left = chord.turn_90() / (2.0 * half);
+                // A positive radius is the shorter way round.
+                let side = if (r > 0.0) == clockwise { -1.0 } else { 1.0 };
+                from.midpoint(to) + left * (height * side)
             }
-            let height = (r * r - half * half).max(0.0).sqrt();
-            let left = chord.turn_90() / (2.0 * half);
-            // A positive radius is the shorter way round.
-            let side = if (r > 0.0) == clockwise { -1.0 } else { 1.0 };
-            from.midpoint(to) + left * (height * side)
+            (None, None, None) => return Err("an arc needs I and J, or R".into()),
+            (None, i, j) => from + kurbo::Vec2::new(i.unwrap_or(0.0), j.unwrap_or(0.0)) * unit,
+            _ => return Err("an arc with both R and a centre".into()),
+        };
+        if block.r.is_none() && from != to && from.distance(to) < ARC_CLOSED_MM {
+            return Err(format!(
+                "an arc whose ends are {} mm apart and not equal: rounding decides whether the controller goes all the way round",
+                from.distance(to)
+            ));
         }
-        (None, None, None) => return Err("an arc needs I and J, or R".into()),
-        (None, i, j) => from + kurbo::Vec2::new(i.unwrap_or(0.0), j.unwrap_or(0.0)) * unit,
-        _ => return Err("an arc with both R and a centre".into()),
-    };
-    let (r, s) = (from.distance(centre), to.distance(centre));
-    if (r - s).abs() > ARC_RADIUS_SLACK_MM && (r - s).abs() > 0.001 * r {
-        return Err(format!(
-            "an arc whose ends are {} and {} mm from its centre",
-            short(r, 4),
-            short(s, 4)
-        ));
-    }
-    let (a, b) = ((from - centre).atan2(), (to - centre).atan2());
-    let mut sweep = (b - a).rem_euclid(std::f64::consts::TAU);
-    if clockwise {
-        sweep -= std::f64::consts::TAU;
-    }
-    // The same start and end mean a full turn.
-    if sweep.abs() < 1e-9 {
-        sweep = std::f64::consts::TAU.copysign(if clockwise { -1.0 } else { 1.0 });
-    }
-    let step = 2.0 * (1.0 - ARC_CHORD_MM / r.max(ARC_CHORD_MM)).acos();
-    let n = (sweep.abs() / step).ceil().clamp(1.0, ARC_CHORDS) as usize;
-    Ok((1..=n)
-        .map(|k| {
-            if k == n {
-                return to;
-            }
-            let t = k as f64 / n as f64;
-            centre + kurbo::Vec2::from_angle(a + sweep * t) * (r + (s - r) * t)
+        let (r, s) = (from.distance(centre), to.distance(centre));
+        if (r - s).abs() > ARC_RADIUS_SLACK_MM && (r - s).abs() > 0.001 * r {
+            return Err(format!(
+                "an arc whose ends are {} and {} mm from its centre",
+                short(r, 4),
+                short(s, 4)
+            ));
+        }
+        let (a, b) = ((from - centre).atan2(), (to - centre).atan2());
+        let mut sweep = (b - a).rem_euclid(std::f64::consts::TAU);
+        if clockwise {
+            sweep -= std::f64::consts::TAU;
+        }
+        // The same start and end mean a full turn.
+        if sweep.abs() < 1e-9 {
+            sweep = std::f64::consts::TAU.copysign(if clockwise { -1.0 } else { 1.0 });
+        }
+        let step = 2.0 * (1.0 - ARC_CHORD_MM / r.max(ARC_CHORD_MM)).acos();
+        Ok(Self {
+            to,
+            centre,
+            radii: (r, s),
+            start_angle: a,
+            sweep,
+            chords: (sweep.abs() / step).ceil().clamp(1.0, ARC_CHORDS) as usize,
         })
-        .collect())
+    }
+
+    /// The ends of the chords, without the arc's first point.
+    fn points(&self) -> impl Iterator<Item = Point> + '_ {
+        let (r, s) = self.radii;
+        (1..=self.chords).map(move |k| {
+            if k == self.chords {
+                return self.to;
+            }
+            let t = k as f64 / self.chords as f64;
+            let direction = kurbo::Vec2::from_angle(self.start_angle + self.sweep * t);
+            self.centre + direction * (r + (s - r) * t)
+        })
+    }
 }
 
 #[cfg(test)]
@@ -559,6 +654,10 @@ mod tests {
             ("G1 X99999999999999999999", Rule::Syntax),
             ("G1 Xé", Rule::Syntax),
             ("G0 X1 S5", Rule::BurnOnRapid),
+            ("G1 X9 F600\rX20", Rule::Syntax),
+            ("G4 P0.1 X60", Rule::Syntax),
+            ("G4 P0 G1", Rule::Syntax),
+            ("G3 X0 Y0.000001 I-10 F600", Rule::Syntax),
         ] {
             assert_eq!(rules(&format!("{HEAD}{line}\nM5\n")), [(4, rule)], "{line}");
         }
@@ -575,6 +674,60 @@ mod tests {
         assert_eq!(
             rules(&format!("{HEAD}M3\nG1\nM5\n")),
             [(5, Rule::StandingBeam)]
+        );
+    }
+
+    #[test]
+    fn a_wait_and_a_move_in_one_line_are_both_read() {
+        let program = read(&format!("{HEAD}G1 X5 F600\nG4 P0.1 X60\nM5\n"));
+        assert_eq!(program.moves[2].to, Point::new(60.0, 0.0));
+        assert!(program.moves[2].burns());
+        // The mode of such a line holds for the lines after it.
+        let program = read(&format!("{HEAD}F600\nG4 P0 G1\nX60\nM5\n"));
+        assert!(program.moves[1].burns());
+    }
+
+    #[test]
+    fn a_return_ends_a_line_as_for_the_controller() {
+        let program = read(&format!("{HEAD}G1 X9 F600 ; right\rY20\nM5\r\n"));
+        assert_eq!(program.findings.len(), 1, "{:?}", program.findings);
+        assert_eq!(program.moves[2].to, Point::new(9.0, 20.0));
+    }
+
+    #[test]
+    fn with_m3_any_line_without_a_target_burns_at_rest_while_a_cutting_mode_is_in_force() {
+        let standing = |line: &str| rules(&format!("G21 G90\nG0 X1 Y1\nG1 X2 F600\n{line}\nM5\n"));
+        for (lines, at) in [
+            ("M3 S500", 4),
+            ("M3 S0\nS500", 5),
+            ("M3 S0\nX3 S9\nM8", 6),
+            ("M3 S0\nX3 S9\nX3", 6),
+            ("M3 S0\nX3 S9\nF100", 6),
+        ] {
+            assert_eq!(standing(lines), [(at, Rule::StandingBeam)], "{lines}");
+        }
+        for lines in ["M3 S0", "M4 S500\nM8", "G0\nM3 S500\nM8", "M3 S0\nX3 S9"] {
+            assert_eq!(standing(lines), [], "{lines}");
+        }
+    }
+
+    #[test]
+    fn arcs_without_end_do_not_fill_the_memory() {
+        let mut text = String::from(HEAD);
+        text.push_str("F600\n");
+        for _ in 0..150 {
+            text.push_str("G2 X0 Y0 I1000000\n");
+        }
+        text.push_str("M5\n");
+        let program = read(&text);
+        assert_eq!(program.moves.len(), 1 + ALL_CHORDS);
+        assert_eq!(
+            program
+                .findings
+                .iter()
+                .map(|f| (f.line, f.rule))
+                .collect::<Vec<_>>(),
+            [(Some(105), Rule::Syntax)]
         );
     }
 }

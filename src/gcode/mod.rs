@@ -13,4 +13,4 @@ mod write;
 
 pub use interpret::{Beam, Move, Program, read};
 pub use verify::{Finding, Rule, TOLERANCE_MM, Verdict, compare_burnt, verify};
-pub use write::{GcodeError, machine_of, write};
+pub use write::{GcodeError, machine_of, passes_of, write};

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use proptest::prelude::*;
 
-use super::{Finding, Rule, read, verify, write};
+use super::{Finding, Rule, compare_burnt, passes_of, read, verify, write};
 use crate::base::ids::Id;
 use crate::linkage::{Handedness, Linkage, TriangleId};
 use crate::machine::{self, Machine};
@@ -199,5 +199,91 @@ fn no_line_is_longer_than_needed_and_modal_words_are_said_once() {
     assert!(
         motion.windows(2).all(|w| w[0][..2] != w[1][..2]),
         "G0 and G1 only where they change"
+    );
+}
+
+#[test]
+fn a_doubled_job_is_not_taken_for_one_of_two_passes() {
+    let (sheet, text, machine) = job(&patch(Handedness::Right, &BTreeSet::new()), 1, false);
+    assert_eq!(passes_of(&text), None);
+    let start = text.find("; slits").unwrap();
+    let end = text.find("M5\n").unwrap();
+    let doubled = format!("{}{}{}", &text[..end], &text[start..end], &text[end..]);
+    let rules: BTreeSet<Rule> = verify(&doubled, &machine, Some(&sheet), None)
+        .unwrap()
+        .findings
+        .iter()
+        .map(|f| f.rule)
+        .collect();
+    assert_eq!(rules, BTreeSet::from([Rule::Repeated]));
+    let (_, text, _) = job(&patch(Handedness::Right, &BTreeSet::new()), 3, false);
+    assert_eq!(passes_of(&text), Some(3));
+}
+
+/// Every chord of the kerf's rounded corners is shorter than the gap that a controller may leave at the end of a stroke.
+#[test]
+fn a_missing_corner_of_short_pieces_is_found_as_one_gap() {
+    let (sheet, text, _) = job(&patch(Handedness::Right, &BTreeSet::new()), 1, false);
+    let all: Vec<[kurbo::Point; 2]> = read(&text)
+        .moves
+        .into_iter()
+        .filter(|m| m.burns())
+        .map(|m| [m.from.unwrap(), m.to])
+        .collect();
+    const GAP_MM: f64 = 0.06;
+    assert_eq!(compare_burnt(&sheet, &all, 1, GAP_MM).unwrap(), []);
+    let is_short = |p: &[kurbo::Point; 2]| p[0].distance(p[1]) < GAP_MM - 0.02;
+    // The longest row of short chords: one rounded corner.
+    let mut longest = 0..0;
+    let mut first = 0;
+    for k in 0..=all.len() {
+        if k == all.len() || !is_short(&all[k]) {
+            if k - first > longest.len() {
+                longest = first..k;
+            }
+            first = k + 1;
+        }
+    }
+    let length: f64 = all[longest.clone()]
+        .iter()
+        .map(|p| p[0].distance(p[1]))
+        .sum();
+    assert!(
+        longest.len() >= 3 && length > GAP_MM + 0.03,
+        "{longest:?}: {length} mm"
+    );
+    let without = |row: std::ops::Range<usize>| [&all[..row.start], &all[row.end..]].concat();
+    let found = compare_burnt(&sheet, &without(longest.clone()), 1, GAP_MM).unwrap();
+    assert_eq!(
+        found.iter().map(|f| f.rule).collect::<Vec<_>>(),
+        [Rule::Missing],
+        "{found:?}"
+    );
+    // One piece alone is a gap that is allowed.
+    let one = longest.start..longest.start + 1;
+    assert_eq!(compare_burnt(&sheet, &without(one), 1, GAP_MM).unwrap(), []);
+}
+
+#[test]
+fn characters_that_a_controller_may_obey_are_found_in_comments_too() {
+    let (sheet, text, machine) = job(&patch(Handedness::Right, &BTreeSet::new()), 1, false);
+    for bad in ["; \u{e4}rger", "(\u{20ac})", "; \u{1}", "; hello!"] {
+        let damaged = text.replacen("; slits", bad, 1);
+        let rules: Vec<Rule> = findings(&damaged, &machine, &sheet, 1)
+            .iter()
+            .map(|f| f.rule)
+            .collect();
+        assert_eq!(rules, [Rule::Syntax], "{bad:?}");
+    }
+}
+
+#[test]
+fn the_m3_word_is_found_even_if_nothing_is_burnt() {
+    let machine = machine::load(machine::DEFAULT).unwrap();
+    let text = "G21\nG90\nG0 X10 Y10\nM3 S500\nM5\n";
+    let found = verify(text, &machine, None, None).unwrap().findings;
+    assert_eq!(
+        found.iter().map(|f| (f.line, f.rule)).collect::<Vec<_>>(),
+        [(Some(4), Rule::ConstantPower)]
     );
 }

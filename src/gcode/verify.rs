@@ -5,7 +5,8 @@ use std::fmt;
 use kurbo::Point;
 
 use super::coverage::{Index, Pieces, Segment};
-use super::interpret::{Beam, Program, read};
+use super::interpret::{Program, read};
+use super::write::passes_of;
 use crate::base::units::short;
 use crate::machine::{Machine, PowerMode};
 use crate::pattern::Sheet;
@@ -94,7 +95,7 @@ pub struct Verdict {
     pub burnt_mm: f64,
     /// Length of rapids, millimetres.
     pub travel_mm: f64,
-    /// How often each cut is gone over, as given or as found; `None` without a sheet.
+    /// How often each cut must be gone over, as given or as the header says; `None` without a sheet.
     pub passes: Option<u32>,
     /// Whether the burnt lines were compared with a sheet.
     pub compared: bool,
@@ -109,8 +110,8 @@ impl Verdict {
 
 /// Judges a job for a machine and, if there is one, against the sheet that it must cut.
 ///
-/// `passes`: how often each cut must be gone over; `None` takes the number from the total length burnt, and then demands
-/// it everywhere.
+/// `passes`: how often each cut must be gone over; `None` takes the number from the job's header ([`passes_of`]), and
+/// without one demands a single pass.
 ///
 /// # Tolerance
 /// A burnt line is a wanted one within [`TOLERANCE_MM`]. Coverage is exact, by intervals and not by samples; the time
@@ -140,8 +141,7 @@ pub fn verify(
     let mut found_passes = None;
     if let Some(sheet) = sheet {
         let wanted = Wanted::new(sheet)?;
-        let once = wanted.length_mm();
-        let n = passes.unwrap_or_else(|| (burnt_mm / once).round().clamp(1.0, 1000.0) as u32);
+        let n = passes.or_else(|| passes_of(text)).unwrap_or(1);
         found_passes = Some(n);
         let burnt: Vec<(Option<usize>, Segment)> = program
             .moves
@@ -190,6 +190,14 @@ fn check_lines(text: &str, machine: &Machine, findings: &mut Vec<Finding>) {
                 format!("the character {c:?} is a real-time command, also in a comment"),
             ));
         }
+        // So do most bytes above 0x7F, of which every other character consists. Returns are judged by the reader.
+        else if let Some(c) = line.chars().find(|c| !matches!(c, ' '..='~' | '\t' | '\r')) {
+            findings.push(Finding::at(
+                i + 1,
+                Rule::Syntax,
+                format!("the character {c:?} is not ASCII text: its bytes may be real-time commands, also in a comment"),
+            ));
+        }
     }
 }
 
@@ -200,6 +208,16 @@ fn check_moves(program: &Program, machine: &Machine, findings: &mut Vec<Finding>
         .rate_mm_per_min
         .x
         .max(machine.motion.rate_mm_per_min.y);
+    if machine.laser.power_mode == PowerMode::Dynamic {
+        for &line in &program.constant_power {
+            findings.push(Finding::at(
+                line,
+                Rule::ConstantPower,
+                "M3 keeps the beam on if the link is lost; this machine's profile allows M4 only"
+                    .into(),
+            ));
+        }
+    }
     // One finding a line and rule: chords of an arc would repeat it.
     let mut last: Option<(usize, Rule)> = None;
     let mut say = |line: usize, rule: Rule, text: String| {
@@ -234,14 +252,6 @@ fn check_moves(program: &Program, machine: &Machine, findings: &mut Vec<Finding>
                 m.line,
                 Rule::Modes,
                 "the beam burns from a place that nobody named".into(),
-            );
-        }
-        if m.beam == Beam::Constant && machine.laser.power_mode == PowerMode::Dynamic {
-            say(
-                m.line,
-                Rule::ConstantPower,
-                "M3 keeps the beam on if the link is lost; this machine's profile allows M4 only"
-                    .into(),
             );
         }
         if m.feed_mm_per_min > fastest {
@@ -304,9 +314,89 @@ impl Wanted {
         }
         Ok(wanted)
     }
+}
 
-    fn length_mm(&self) -> f64 {
-        self.segments.iter().map(Segment::length).sum()
+/// A stretch of a cut that is burnt too seldom or too often, as distances along the whole cut.
+#[derive(Clone, Copy)]
+struct Stretch {
+    from: f64,
+    to: f64,
+    /// How often it is burnt where that is worst.
+    count: i32,
+    /// A place on it.
+    at: Point,
+    /// It goes round a corner of the cut.
+    corner: bool,
+}
+
+impl Stretch {
+    /// Both as one; `next` begins where `self` ends.
+    fn joined(self, next: Self, worst: fn(i32, i32) -> i32) -> Self {
+        Self {
+            from: self.from,
+            to: next.to,
+            count: worst(self.count, next.count),
+            at: self.at,
+            corner: true,
+        }
+    }
+}
+
+/// The stretches of one cut: those that meet at a corner are one, because what is missing there is missing in one piece,
+/// however short the segments of a rounded corner are.
+struct Stretches {
+    all: Vec<Stretch>,
+    worst: fn(i32, i32) -> i32,
+}
+
+impl Stretches {
+    fn new(worst: fn(i32, i32) -> i32) -> Self {
+        Self {
+            all: Vec::new(),
+            worst,
+        }
+    }
+
+    /// Notes the next stretch: `run` of a segment that begins `before` mm after the cut's first point.
+    fn note(&mut self, segment: &Segment, before: f64, run: (f64, f64), count: i32) {
+        let new = Stretch {
+            from: before + run.0,
+            to: before + run.1,
+            count,
+            at: segment.at(0.5 * (run.0 + run.1)),
+            corner: false,
+        };
+        match self.all.last_mut() {
+            Some(last) if new.from - last.to <= NO_GAP_MM => *last = last.joined(new, self.worst),
+            _ => self.all.push(new),
+        }
+    }
+
+    /// The cut is a closed line of this length: what ends at its end goes on at its beginning.
+    fn close(&mut self, whole: f64) {
+        if let [first, .., last] = self.all.as_mut_slice()
+            && first.from <= NO_GAP_MM
+            && whole - last.to <= NO_GAP_MM
+        {
+            let mut tail = *last;
+            tail.from -= whole;
+            *first = tail.joined(*first, self.worst);
+            self.all.pop();
+        }
+    }
+
+    /// Total length, worst count and first place of the stretches longer than `least` says, and empties the list.
+    fn take(&mut self, least: impl Fn(&Stretch) -> f64) -> Option<(f64, i32, Point)> {
+        let mut found: Option<(f64, i32, Point)> = None;
+        for stretch in self.all.drain(..) {
+            let length = stretch.to - stretch.from;
+            if length > least(&stretch) {
+                let entry = found.get_or_insert((0.0, stretch.count, stretch.at));
+                entry.0 += length;
+                entry.1 = (self.worst)(entry.1, stretch.count);
+            }
+        }
+        found
     }
 }
 
@@ -314,7 +404,7 @@ impl Wanted {
 /// often as wanted but for gaps up to `gap_mm`, and nothing else. Findings carry no line.
 ///
 /// # Tolerance
-/// Sideways [`TOLERANCE_MM`]. `gap_mm` is for what a controller does at the ends of a stroke, where it switches the
+/// Sideways [`TOLERANCE_MM`]. `gap_mm`, measured along the cut and round its corners, is for what a controller does at the ends of a stroke, where it switches the
 /// beam off a little before it stands.
 ///
 /// # Errors
@@ -345,36 +435,37 @@ fn compare(
     let passes = passes as i32;
     let burnt_index = Index::new(burnt.iter().map(|(_, s)| *s).collect());
     let mut pieces = Pieces::default();
+    let mut missing = Stretches::new(i32::min);
+    let mut repeated = Stretches::new(i32::max);
     for (name, range) in &wanted.cuts {
-        // Per cut: total length and worst count of what is missing and repeated, and the first place of each.
-        let mut missing: Option<(f64, i32, Point)> = None;
-        let mut repeated: Option<(f64, i32, Point)> = None;
+        let mut whole = 0.0;
         for segment in &wanted.segments[range.clone()] {
             burnt_index.along(segment, TOLERANCE_MM, &mut pieces);
             let length = segment.length();
-            let note = |slot: &mut Option<(f64, i32, Point)>, run: (f64, f64), count: i32| {
-                let entry = slot.get_or_insert((0.0, count, segment.at(0.5 * (run.0 + run.1))));
-                entry.0 += run.1 - run.0;
-            };
             pieces.runs(
                 true,
                 length,
-                gap_mm,
+                0.0,
                 |n| n < passes,
-                |run, n| note(&mut missing, run, n),
+                |run, n| missing.note(segment, whole, run, n),
             );
             pieces.runs(
                 false,
                 length,
-                JOINT_MM,
+                0.0,
                 |n| n > passes,
-                |run, n| note(&mut repeated, run, n),
+                |run, n| repeated.note(segment, whole, run, n),
             );
+            whole += length;
         }
-        let whole: f64 = wanted.segments[range.clone()]
-            .iter()
-            .map(Segment::length)
-            .sum();
+        // A slit is one segment; every other cut is closed.
+        if range.len() > 1 {
+            missing.close(whole);
+            repeated.close(whole);
+        }
+        let missing = missing.take(|_| gap_mm);
+        // At a corner each of its two sides may lie within the tolerance of the other.
+        let repeated = repeated.take(|s| if s.corner { 2.0 * JOINT_MM } else { JOINT_MM });
         let ends = (
             wanted.segments[range.start].a,
             wanted.segments[range.end - 1].b,

@@ -82,10 +82,28 @@ impl Writer {
 /// How the header names the machine profile that a job was written for.
 const MACHINE_LINE: &str = "; machine ";
 
+/// How the header says how often each cut is gone over; left out for once.
+const PASSES_LINE: &str = "; passes ";
+
+/// Lines of a text that may be its header.
+const HEADER_LINES: usize = 8;
+
+/// How often a job goes over each cut, from its header: `None` where it does not say so, which in our own jobs means
+/// once.
+pub fn passes_of(text: &str) -> Option<u32> {
+    text.lines()
+        .take(HEADER_LINES)
+        .find_map(|line| line.strip_prefix(PASSES_LINE))?
+        .trim()
+        .parse()
+        .ok()
+        .filter(|n| (1..=1000).contains(n))
+}
+
 /// The name of the machine profile that a job was written for, from its header; `None` for G-code of other programs.
 pub fn machine_of(text: &str) -> Option<&str> {
     text.lines()
-        .take(8)
+        .take(HEADER_LINES)
         .find_map(|line| line.strip_prefix(MACHINE_LINE))
         .map(str::trim)
 }
@@ -113,6 +131,12 @@ pub fn write(
     w.line(format!("; kagome {}", env!("CARGO_PKG_VERSION")));
     w.line(format!("{MACHINE_LINE}{}", machine.name));
     w.line(format!("; material {}", material.name));
+    // The verifier must not guess this from what is burnt: a job that is doubled by mistake would pass.
+    if let Some(passes) = toolpath.cuts.iter().map(|c| c.passes).max()
+        && passes > 1
+    {
+        w.line(format!("{PASSES_LINE}{passes}"));
+    }
     w.line(format!(
         "; {} strokes, cut {} mm, travel {} mm",
         figures.strokes,
