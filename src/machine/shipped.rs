@@ -133,6 +133,8 @@ mod tests {
             ),
             ("x_mm = 0", "x_mm = -3", "job.park.x_mm"),
             ("\"G54\"", "\"G54 ; ready?\"", "job.preamble[0]"),
+            ("\"G54\"", "\"G54 (~)\"", "job.preamble[0]"),
+            ("\"G54\"", "\"G54 ; f\u{fc}r\"", "job.preamble[0]"),
             ("\"G54\"", "\"\"", "job.preamble[0]"),
             (
                 "\"M8\"",
