@@ -414,3 +414,21 @@ fn bad_input_costs_nothing() {
         );
     }
 }
+
+#[test]
+fn a_port_that_does_not_exist_is_answered_with_those_that_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let job = "G21\nG90\nM4 S0\nG0 X10 Y10\nG1 X20 F600 S300\nM5\nM2\n";
+    std::fs::write(folder.path().join("job.nc"), job).unwrap();
+    let output = kagome(&["send", "job.nc", "--port", "/dev/ttyNOPE"], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    let text = stderr(&output);
+    assert!(
+        text.contains("/dev/ttyNOPE") && text.contains("sim"),
+        "{text}"
+    );
+    assert!(
+        !cfg!(target_os = "linux") || text.contains("dialout"),
+        "{text}"
+    );
+}

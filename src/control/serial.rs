@@ -45,19 +45,27 @@ pub enum PortError {
 }
 
 fn known(present: &[String]) -> String {
-    if present.is_empty() {
-        "no serial port was found: is the machine plugged in and switched on? --port sim is always there".into()
+    let mut text = if present.is_empty() {
+        "no serial port was found: is the machine plugged in and switched on? --port sim is always there".to_owned()
     } else {
         format!(
             "there are {} (and sim, the built-in machine)",
             present.join(", ")
         )
+    };
+    if cfg!(target_os = "linux") {
+        text += ". To be allowed to use a serial port, ";
+        text += DIALOUT;
     }
+    text
 }
+
+/// What Linux asks of a person before a serial port may be opened.
+const DIALOUT: &str = "add yourself to the group that owns serial ports with `sudo usermod -a -G dialout $USER`, then log out and in (on Arch the group is uucp)";
 
 fn hint(port: &str) -> String {
     if cfg!(target_os = "linux") && port.starts_with("/dev/tty") {
-        ": add yourself to the group that owns serial ports with `sudo usermod -a -G dialout $USER`, then log out and in (on Arch the group is uucp)".into()
+        format!(": {DIALOUT}")
     } else {
         ": check who owns it".into()
     }
