@@ -12,7 +12,9 @@ use std::path::PathBuf;
 use divan::{Bencher, black_box};
 use kagome::base::progress::Silent;
 use kagome::base::sparse::{Cholesky, Pattern};
-use kagome::conformal::{ConeRequest, FlattenOptions, Flattened, MetricSolver, Sizing, flatten};
+use kagome::conformal::{
+    ConeRequest, FlattenOptions, Flattened, MetricSolver, Singularities, Sizing, flatten,
+};
 use kagome::job::{Request, Source, make};
 use kagome::linkage::{Built, Handedness, LinkageOptions, build};
 use kagome::mesh::{ClosestPoint, ImportOptions, Sample, Surface, import_file};
@@ -115,7 +117,7 @@ fn conformal_metric_without_cone(bencher: Bencher<'_, '_>, case: usize) {
     let surface = surface(case);
     bencher.bench_local(|| {
         MetricSolver::new(&surface)
-            .and_then(|mut s| s.solve(&[], &Silent))
+            .and_then(|mut s| s.solve(&Singularities::none(&surface), &Silent))
             .map(|m| m.steps)
     });
 }

@@ -7,7 +7,10 @@
 )]
 
 use kagome::base::progress::Silent;
-use kagome::conformal::{Cone, ConeRequest, FlattenOptions, MetricSolver, Sizing, flatten};
+use kagome::conformal::{
+    Cone, ConeRequest, FlattenOptions, Layout, MetricSolver, Singularities, Sizing, cut_graph,
+    flatten,
+};
 use kagome::mesh::{Sample, Surface, VertexId};
 
 fn sample(text: &str) -> Surface {
@@ -22,7 +25,7 @@ fn caps_come_back_to_ten_digits() {
         let cap = sample(&format!("cap:half_angle_deg={half_angle_deg}"));
         let metric = MetricSolver::new(&cap)
             .unwrap()
-            .solve(&[], &Silent)
+            .solve(&Singularities::none(&cap), &Silent)
             .unwrap();
         let top = cap
             .positions()
@@ -93,7 +96,7 @@ fn unfolding_closes_with_and_without_a_cone() {
     ] {
         let options = FlattenOptions {
             sigma: 2.0,
-            cones: ConeRequest::Given(cones.clone()),
+            cones: ConeRequest::Given(Singularities::cones(&bump, cones.clone())),
             sizing: Sizing::Triangles(1500.0),
             cone_clearance: 1.1,
         };
@@ -143,10 +146,13 @@ fn a_fine_mesh_unfolds_as_well_as_a_coarse_one() {
             .unwrap();
         let options = FlattenOptions {
             sigma: 2.0,
-            cones: ConeRequest::Given(vec![Cone {
-                vertex: tip,
-                units: 1,
-            }]),
+            cones: ConeRequest::Given(Singularities::cones(
+                &mask,
+                vec![Cone {
+                    vertex: tip,
+                    units: 1,
+                }],
+            )),
             sizing: Sizing::Triangles(500.0),
             cone_clearance: 1.1,
         };
@@ -165,35 +171,118 @@ fn a_fine_mesh_unfolds_as_well_as_a_coarse_one() {
 fn a_reused_solver_gives_the_same_bits() {
     let bump = sample("bump");
     let mut solver = MetricSolver::new(&bump).unwrap();
-    let first = solver.solve(&[], &Silent).unwrap();
-    solver
-        .solve(
-            &[Cone {
-                vertex: VertexId(0),
-                units: -1,
-            }],
-            &Silent,
-        )
-        .unwrap();
-    let again = solver.solve(&[], &Silent).unwrap();
+    let none = Singularities::none(&bump);
+    let first = solver.solve(&none, &Silent).unwrap();
+    let cone = Cone {
+        vertex: VertexId(0),
+        units: -1,
+    };
+    let other = Singularities::cones(&bump, vec![cone]);
+    solver.solve(&other, &Silent).unwrap();
+    let again = solver.solve(&none, &Silent).unwrap();
     assert_eq!(first.u, again.u);
 }
 
+/// λ's largest over smallest value with these singularities; the map must close.
+fn ratio(surface: &Surface, singularities: &Singularities) -> f64 {
+    let metric = MetricSolver::new(surface)
+        .unwrap()
+        .solve(singularities, &Silent)
+        .unwrap();
+    let cut = cut_graph(surface, &singularities.cones);
+    let layout = Layout::unfold(surface, &metric, &singularities.cones, &cut).unwrap();
+    assert!(
+        layout.closure < 1e-9 && layout.seam_gap_mm < 1e-8,
+        "{:e} {:e}",
+        layout.closure,
+        layout.seam_gap_mm
+    );
+    let (low, high) = layout
+        .log_scale
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &x| {
+            (l.min(x), h.max(x))
+        });
+    (high - low).exp()
+}
+
+/// A torus needs no cone: its map is that of the paper (§3.1.1), with λ's ratio (t + 1)/(t − 1).
 #[test]
-fn what_is_no_disk_is_refused_with_advice() {
-    for name in ["torus", "vase", "octasphere"] {
-        let options = FlattenOptions {
-            sigma: 2.0,
-            cones: ConeRequest::Auto,
-            sizing: Sizing::Triangles(500.0),
-            cone_clearance: 0.7,
-        };
-        let error = flatten(&sample(name), &options, &Silent)
-            .unwrap_err()
-            .to_string();
+fn a_torus_needs_the_ratio_of_its_closed_form() {
+    for t in [13f64.sqrt(), 4.0, 6.0] {
+        let torus = sample(&format!("torus:t={t},faces=20000"));
+        let found = ratio(&torus, &Singularities::none(&torus));
+        let exact = (t + 1.0) / (t - 1.0);
         assert!(
-            error.contains("not a disk") && error.contains("rims"),
-            "{error}"
+            (found / exact - 1.0).abs() < 2e-3,
+            "t = {t}: {found}, not {exact}"
         );
     }
+}
+
+/// A surface of revolution is unrolled to a fan of angle 2πa, on which λ = r e^{−as} up to a factor, with the conformal
+/// height s = ∫ dl / r. The turning of its rims chooses a in thirds, and the scale follows.
+#[test]
+fn the_turning_of_a_rim_changes_the_scale_as_on_a_fan() {
+    for name in ["funnel", "vase", "catenoid"] {
+        let surface = sample(&format!("{name}:faces=20000"));
+        let mut profile: Vec<(f64, f64)> = surface
+            .positions()
+            .iter()
+            .map(|p| (p.z, p.x.hypot(p.y)))
+            .collect();
+        profile.sort_by(|a, b| a.0.total_cmp(&b.0));
+        profile.dedup_by(|b, a| (a.0 - b.0).abs() < 1e-6);
+        let upwards = surface.position(surface.rims()[0][0]).z > profile[profile.len() / 2].0;
+        for third in -3..=3 {
+            let (mut s, mut low, mut high) = (0.0, f64::INFINITY, 0.0f64);
+            let mut before = profile[0];
+            for &(z, r) in &profile {
+                s += (z - before.0).hypot(r - before.1) / (0.5 * (r + before.1));
+                before = (z, r);
+                let scale = r * (-f64::from(third) / 3.0 * s).exp();
+                (low, high) = (low.min(scale), high.max(scale));
+            }
+            // a > 0 opens the fan upwards: the lower rim is the inner one and turns by −2πa.
+            let turnings = vec![if upwards { -third } else { third }];
+            let given = Singularities {
+                cones: Vec::new(),
+                turnings,
+            };
+            let found = ratio(&surface, &given);
+            assert!(
+                (found / (high / low) - 1.0).abs() < 5e-3,
+                "{name} at {third}: {found}, not {}",
+                high / low
+            );
+        }
+    }
+}
+
+/// A sphere with cones of +1 at the corners of an octahedron; and curvature that does not add up is refused.
+#[test]
+fn a_closed_surface_needs_cones_that_sum_to_its_curvature() {
+    let sphere = sample("octasphere");
+    let corners: Vec<Cone> = (0..6)
+        .map(|i| {
+            let axis = [[1.0, 0.0], [-1.0, 0.0]][i % 2][0];
+            let vertex = sphere
+                .positions()
+                .ids()
+                .max_by(|a, b| {
+                    let at = |v: &VertexId| sphere.position(*v)[i / 2] * axis;
+                    at(a).total_cmp(&at(b))
+                })
+                .unwrap();
+            Cone { vertex, units: 1 }
+        })
+        .collect();
+    let mut all = Singularities::cones(&sphere, corners);
+    assert!(ratio(&sphere, &all) > 2.0, "λ falls to 0 at the cones");
+    all.cones.pop();
+    let error = MetricSolver::new(&sphere)
+        .unwrap()
+        .solve(&all, &Silent)
+        .unwrap_err();
+    assert!(error.to_string().contains("exactly 6"), "{error}");
 }

@@ -7,7 +7,7 @@
 )]
 
 use kagome::base::progress::Silent;
-use kagome::conformal::{ConeRequest, FlattenOptions, Sizing, flatten};
+use kagome::conformal::{ConeRequest, FlattenOptions, Singularities, Sizing, flatten};
 use kagome::linkage::{Built, Handedness, LinkageOptions, build};
 use kagome::mesh::{ClosestPoint, Sample, Surface};
 use kagome::rationalize::{Quality, Solver, rationalize};
@@ -104,7 +104,7 @@ fn a_steep_bump_without_its_cone_keeps_its_edges_and_shows_the_distance() {
         "bump",
         700.0,
         0,
-        ConeRequest::Given(vec![]),
+        ConeRequest::Given(Singularities::default()),
         0.0,
         Handedness::Right,
     );

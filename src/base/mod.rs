@@ -6,6 +6,7 @@
 //! - [`atomic`]: outputs that appear complete or not at all;
 //! - [`document`]: TOML that a person wrote, read strictly and blamed exactly;
 //! - [`sparse`]: symmetric positive definite systems, with the symbolic factor kept between solves;
+//! - [`union`]: disjoint sets;
 //! - [`units`]: the few conversions and number formats that several rooms share.
 
 pub mod atomic;
@@ -14,4 +15,5 @@ pub mod document;
 pub mod ids;
 pub mod progress;
 pub mod sparse;
+pub mod union;
 pub mod units;

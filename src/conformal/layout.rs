@@ -2,16 +2,17 @@
 //!
 //! Coordinates are millimetres on the closed sheet: X right, Y up, seen from outside. The chart is continuous except
 //! across the cut; there a [`Transition`] takes coordinates of one side to those of the other, so that one can walk
-//! across the seam. With a cone the chart's origin is the cone, and the transition a rotation about it by a multiple
-//! of 120°, exactly; without one the origin is the chart's centre of area.
+//! across the seam: a rotation by a multiple of 120°, exactly, and a translation, the same along a whole [`Segment`] of
+//! the cut. With cones the chart's origin is the first of them, without the chart's centre of area.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::f64::consts::PI;
 
 use nalgebra::{Complex, ComplexField as _, Point2};
 
+use super::cut::{self, Segment};
 use super::metric::angles;
-use super::{Cone, Metric};
+use super::{CURVATURE_UNIT, Cone, ConformalError, Metric, distance};
 use crate::base::ids::{Id as _, Per};
 use crate::mesh::{FaceId, HalfedgeId, Surface, VertexId};
 
@@ -63,18 +64,24 @@ pub struct Layout {
     pub corners: Per<FaceId, [Point2<f64>; 3]>,
     /// ln λ per vertex; λ is millimetres on the surface per millimetre on the closed sheet.
     pub log_scale: Per<VertexId, f64>,
-    /// For each halfedge on the cut: from the chart coordinates of its face to those of its twin's face.
-    pub seam: BTreeMap<HalfedgeId, Transition>,
     /// The cones, in the order given.
     pub cones: Vec<Cone>,
-    /// The cut as it was unfolded, from the cone to the rim.
-    pub cut: Vec<HalfedgeId>,
+    /// Flat distance of every vertex from the nearest cone, millimetres; infinite without cones.
+    pub cone_distance_mm: Per<VertexId, f64>,
+    /// The cut along which it was unfolded, with the transition across each stretch.
+    pub segments: Vec<Segment>,
+    /// The transition of every halfedge on the cut: from the chart at its face to that at its twin's.
+    pub seam: BTreeMap<HalfedgeId, Transition>,
     /// Largest relative error of a flat edge length against the metric: how well the unfolding closed.
     pub closure: f64,
-    /// How far the two sides of the cut are from being each other's image under the seam transitions, millimetres:
-    /// rounding, gathered on the way around the cone.
+    /// How far the two sides of the cut are from being each other's image under the transitions, millimetres:
+    /// rounding, gathered on the way around cones and handles.
     pub seam_gap_mm: f64,
 }
+
+/// A rotation across the cut may be this far from a multiple of 120°, radians: far above rounding, far below what a
+/// pattern could follow.
+const TURN_TOLERANCE: f64 = 1e-6;
 
 /// The range of λ over a layout.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,11 +97,19 @@ pub struct ScaleSummary {
 }
 
 impl Layout {
-    /// Unfolds a metric, cut open along `cut` (halfedges from the one cone outwards, or nothing for a disk without
-    /// cones). λ is normalised so that the metric's own lengths are millimetres; see [`Layout::rescaled`].
-    pub fn unfold(surface: &Surface, metric: &Metric, cones: &[Cone], cut: &[HalfedgeId]) -> Self {
+    /// Unfolds a metric, cut open along `edges` (see [`super::cut_graph`]), which must leave a disk. λ is normalised so
+    /// that the metric's own lengths are millimetres; see [`Layout::rescale`].
+    ///
+    /// # Errors
+    /// [`ConformalError::Holonomy`] if the metric turns by something else than a multiple of 120° along a handle.
+    pub fn unfold(
+        surface: &Surface,
+        metric: &Metric,
+        cones: &[Cone],
+        edges: &[HalfedgeId],
+    ) -> Result<Self, ConformalError> {
         let mut is_cut = Per::<HalfedgeId, bool>::filled(surface.faces().len() * 3, false);
-        for &h in cut {
+        for &h in edges {
             is_cut[h] = true;
             if let Some(twin) = surface.twin(h) {
                 is_cut[twin] = true;
@@ -147,9 +162,10 @@ impl Layout {
         let mut layout = Self {
             corners,
             log_scale: metric.u.iter().map(|u| -u).collect(),
-            seam: BTreeMap::new(),
             cones: cones.to_vec(),
-            cut: cut.to_vec(),
+            cone_distance_mm: distance::from_cones(surface, metric, cones),
+            segments: cut::segments(surface, cones, edges),
+            seam: BTreeMap::new(),
             closure: 0.0,
             seam_gap_mm: 0.0,
         };
@@ -164,22 +180,23 @@ impl Layout {
             turn: upright,
             shift,
         });
-        layout.find_seam(surface);
-        layout
+        layout.measure_seam(surface)?;
+        Ok(layout)
     }
 
-    /// The same layout enlarged by `factor`: flat lengths grow, λ shrinks.
-    pub fn rescaled(&self, factor: f64) -> Self {
-        let mut layout = self.clone();
-        layout
-            .corners
+    /// Enlarges the chart by `factor`: flat lengths grow, λ shrinks.
+    pub fn rescale(&mut self, factor: f64) {
+        self.corners
             .iter_mut()
             .flatten()
             .for_each(|p| p.coords *= factor);
-        layout.seam.values_mut().for_each(|t| t.shift *= factor);
-        layout.log_scale.iter_mut().for_each(|x| *x -= factor.ln());
-        layout.seam_gap_mm *= factor;
-        layout
+        self.cone_distance_mm.iter_mut().for_each(|d| *d *= factor);
+        self.segments
+            .iter_mut()
+            .for_each(|s| s.transition.shift *= factor);
+        self.seam.values_mut().for_each(|t| t.shift *= factor);
+        self.log_scale.iter_mut().for_each(|x| *x -= factor.ln());
+        self.seam_gap_mm *= factor;
     }
 
     /// Flat area in mm².
@@ -200,7 +217,7 @@ impl Layout {
     /// λ's range over the vertices farther than `exclude_mm` (on the flat sheet) from every cone, and the part of the
     /// surface's area, the cones' neighbourhoods left out, where λ lies in [1, `sigma`].
     pub fn scale_summary(&self, surface: &Surface, exclude_mm: f64, sigma: f64) -> ScaleSummary {
-        let far = self.far_from_cones(exclude_mm);
+        let far = |v: VertexId| self.cone_distance_mm[v] > exclude_mm;
         let mut summary = ScaleSummary {
             min: f64::INFINITY,
             max: 0.0,
@@ -210,7 +227,7 @@ impl Layout {
         let mut total = 0.0;
         for (face, v) in surface.faces().iter_ids() {
             for k in 0..3 {
-                if !far(self.corners[face][k]) {
+                if !far(v[k]) {
                     continue;
                 }
                 let scale = self.log_scale[v[k]].exp();
@@ -219,10 +236,7 @@ impl Layout {
                     (summary.max, summary.max_vertex) = (scale, v[k]);
                 }
             }
-            let centre = self.corners[face]
-                .iter()
-                .fold(Point2::origin(), |s, p| s + p.coords / 3.0);
-            if far(centre) {
+            if v.iter().any(|&v| far(v)) {
                 let (area, scale) = (
                     surface.face_area(face),
                     self.scale_at(surface, face, [1.0 / 3.0; 3]),
@@ -237,10 +251,31 @@ impl Layout {
         summary
     }
 
-    /// Whether a chart point is farther than `radius_mm` from every cone. (One cone: it is the chart's origin.)
-    fn far_from_cones(&self, radius_mm: f64) -> impl Fn(Point2<f64>) -> bool + use<> {
-        let cone = !self.cones.is_empty();
-        move |p| !cone || p.coords.norm() > radius_mm
+    /// Where λ, in a window as wide as σ allows, covers most of the surface (the cones' neighbourhoods left out): the
+    /// smallest λ of the best window [λ, σ λ].
+    pub fn best_window(&self, surface: &Surface, exclude_mm: f64, sigma: f64) -> f64 {
+        let mut parts: Vec<(f64, f64)> = surface
+            .faces()
+            .iter_ids()
+            .filter(|(_, v)| v.iter().any(|&v| self.cone_distance_mm[v] > exclude_mm))
+            .map(|(face, v)| {
+                let mean = v.iter().map(|&v| self.log_scale[v]).sum::<f64>() / 3.0;
+                (mean, surface.face_area(face))
+            })
+            .collect();
+        parts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (mut best, mut covered, mut end) = ((0.0, 0.0), 0.0, 0);
+        for (low, area) in &parts {
+            while end < parts.len() && parts[end].0 <= low + sigma.ln() {
+                covered += parts[end].1;
+                end += 1;
+            }
+            if covered > best.0 {
+                best = (covered, *low);
+            }
+            covered -= area;
+        }
+        best.1.exp()
     }
 
     /// Angle distortion per face: the ratio of the singular values of the flat → surface map, 1 if conformal.
@@ -271,12 +306,27 @@ impl Layout {
             .flatten()
             .for_each(|p| *p = motion.apply(*p));
         let back = motion.inverse();
-        self.seam
-            .values_mut()
-            .for_each(|t| *t = back.then(t).then(motion));
+        let segments = self.segments.iter_mut().map(|s| &mut s.transition);
+        for transition in segments.chain(self.seam.values_mut()) {
+            *transition = back.then(transition).then(motion);
+        }
     }
 
-    fn vertex_position(&self, surface: &Surface, vertex: VertexId) -> Point2<f64> {
+    /// Puts other corners and transitions (one a segment, in their order) in place of the chart's own.
+    pub fn set_chart(
+        &mut self,
+        surface: &Surface,
+        corners: Per<FaceId, [Point2<f64>; 3]>,
+        transitions: &[Transition],
+    ) {
+        self.corners = corners;
+        for (segment, transition) in self.segments.iter_mut().zip(transitions) {
+            segment.transition = *transition;
+        }
+        self.spread_transitions(surface);
+    }
+
+    pub(crate) fn vertex_position(&self, surface: &Surface, vertex: VertexId) -> Point2<f64> {
         surface
             .around(vertex)
             .next()
@@ -327,32 +377,66 @@ impl Layout {
         worst
     }
 
-    /// Transitions across the cut. The rotation is snapped to the multiple of 120° that the cones allow, and with one
-    /// cone, which is the origin, there is nothing left to translate.
-    fn find_seam(&mut self, surface: &Surface) {
-        for &h in &self.cut {
-            let Some(twin) = surface.twin(h) else {
-                continue;
+    /// Measures the transition across each segment and snaps its rotation to the multiple of 120° that it must be.
+    fn measure_seam(&mut self, surface: &Surface) -> Result<(), ConformalError> {
+        let complex = |p: Point2<f64>| Complex::new(p.x, p.y);
+        for i in 0..self.segments.len() {
+            let sides = || {
+                let halfedges = self.segments[i].halfedges.iter();
+                halfedges.filter_map(|&h| self.both_sides(surface, h))
             };
-            let ends = |h: HalfedgeId| {
-                let c = &self.corners[h.face()];
-                (c[h.corner()], c[(h.corner() + 1) % 3])
-            };
-            let ((a, b), (tb, ta)) = (ends(h), ends(twin));
-            let complex = |v: nalgebra::Vector2<f64>| Complex::new(v.x, v.y);
-            let measured = complex(tb - ta) / complex(b - a);
-            let thirds = (measured.argument() / (2.0 * PI / 3.0)).round();
-            let turn = Complex::from_polar(1.0, thirds * 2.0 * PI / 3.0);
-            let there = Transition {
-                turn,
-                shift: Complex::new(0.0, 0.0),
-            };
-            let gap = (there.apply(a) - ta)
-                .norm()
-                .max((there.apply(b) - tb).norm());
-            self.seam_gap_mm = self.seam_gap_mm.max(gap);
-            self.seam.insert(h, there);
-            self.seam.insert(twin, there.inverse());
+            let turned: Complex<f64> = sides()
+                .map(|[(a, b), (ta, tb)]| complex(tb - ta.coords) * complex(b - a.coords).conj())
+                .sum();
+            let thirds = turned.argument() / CURVATURE_UNIT;
+            if (thirds - thirds.round()).abs() * CURVATURE_UNIT > TURN_TOLERANCE {
+                return Err(ConformalError::Holonomy {
+                    turn_deg: turned.argument().to_degrees(),
+                });
+            }
+            let turn = Complex::from_polar(1.0, thirds.round() * CURVATURE_UNIT);
+            let shifts: Vec<Complex<f64>> = sides()
+                .flat_map(|[(a, b), (ta, tb)]| [(a, ta), (b, tb)])
+                .map(|(here, there)| complex(there) - turn * complex(here))
+                .collect();
+            let shift = shifts.iter().sum::<Complex<f64>>() / f64::max(shifts.len() as f64, 1.0);
+            self.segments[i].transition = Transition { turn, shift };
+        }
+        self.spread_transitions(surface);
+        Ok(())
+    }
+
+    /// The ends of a halfedge as its own face has them, and as its twin's face has the same two.
+    fn both_sides(
+        &self,
+        surface: &Surface,
+        h: HalfedgeId,
+    ) -> Option<[(Point2<f64>, Point2<f64>); 2]> {
+        let ends = |h: HalfedgeId| {
+            let c = &self.corners[h.face()];
+            (c[h.corner()], c[(h.corner() + 1) % 3])
+        };
+        let (b, a) = ends(surface.twin(h)?);
+        Some([ends(h), (a, b)])
+    }
+
+    /// Gives every halfedge on the cut the transition of its segment, and measures the gap that is left.
+    fn spread_transitions(&mut self, surface: &Surface) {
+        self.seam_gap_mm = 0.0;
+        self.seam.clear();
+        for segment in &self.segments {
+            for &h in &segment.halfedges {
+                let (Some(twin), Some([(a, b), (ta, tb)])) =
+                    (surface.twin(h), self.both_sides(surface, h))
+                else {
+                    continue;
+                };
+                let over = segment.transition;
+                let gap = (over.apply(a) - ta).norm().max((over.apply(b) - tb).norm());
+                self.seam_gap_mm = self.seam_gap_mm.max(gap);
+                self.seam.insert(h, over);
+                self.seam.insert(twin, over.inverse());
+            }
         }
     }
 }

@@ -1,14 +1,17 @@
-//! The discretely conformal metric of a disk with given cone angles (CETM).
+//! The discretely conformal metric with given singularities (CETM), on a surface of any topology.
 //!
 //! Two metrics on one mesh are discretely conformally equivalent if l̃ᵢⱼ = e^{(uᵢ+uⱼ)/2} lᵢⱼ. The u whose angle sums are
-//! Θᵢ inside and that vanishes on the rim is the minimum of a convex function with gradient Θᵢ − Σα and the cotangent
-//! Laplacian of the scaled metric as Hessian (Springborn, Schröder, Pinkall: Conformal equivalence of triangle meshes,
-//! 2008, §§3–4); u = 0 on the rim gives the least area distortion (same paper, appendix E). Where a triangle inequality
-//! fails the angles are extended by 0 and π, which keeps the function convex and once differentiable.
+//! Θᵢ is the minimum of a convex function with gradient Θᵢ − Σα and the cotangent Laplacian of the scaled metric as
+//! Hessian (Springborn, Schröder, Pinkall: Conformal equivalence of triangle meshes, 2008, §§3–4). Where a triangle
+//! inequality fails the angles are extended by 0 and π, which keeps the function convex and once differentiable.
+//!
+//! On each rim u is constant, which gives the least area distortion (same paper, appendix E). All vertices of a rim share
+//! one unknown, and the sum of their equations is the rim's turning. The first rim, or one vertex of a closed surface,
+//! has u = 0: the function does not see a shift of u, and Gauss–Bonnet makes that last equation true.
 
 use std::f64::consts::PI;
 
-use super::{Cone, ConformalError};
+use super::{CURVATURE_UNIT, ConformalError, Singularities};
 use crate::base::ids::Per;
 use crate::base::progress::Progress;
 use crate::base::sparse::{Cholesky, FactorError, Pattern};
@@ -29,7 +32,7 @@ const MAX_STEPS: usize = 60;
 /// The result of a solve.
 #[derive(Clone, Debug)]
 pub struct Metric {
-    /// Logarithmic factor u per vertex: l̃ᵢⱼ = e^{(uᵢ+uⱼ)/2} lᵢⱼ; 0 on the rim.
+    /// Logarithmic factor u per vertex: l̃ᵢⱼ = e^{(uᵢ+uⱼ)/2} lᵢⱼ; constant on each rim, 0 on the first.
     pub u: Per<VertexId, f64>,
     /// Newton steps taken.
     pub steps: usize,
@@ -77,35 +80,50 @@ pub(super) fn angles(lengths: [f64; 3]) -> ([f64; 3], [f64; 3], bool) {
     )
 }
 
-/// Solves for the metric of one surface with different cones; the symbolic factor is computed once.
+/// Solves for the metric of one surface with different singularities; the symbolic factor is computed once.
 pub struct MetricSolver<'a> {
     surface: &'a Surface,
-    /// Row of each interior vertex, `u32::MAX` on the rim.
+    /// Unknown of each vertex: its own inside, one for each rim; [`NONE`] where u = 0.
     row: Per<VertexId, u32>,
     rows: usize,
     /// Logarithms of the side lengths.
     log_length: Per<FaceId, [f64; 3]>,
-    /// Value slots: per face three diagonal entries (corner k) and three for side k (or `u32::MAX` at the rim).
+    /// Value slots: per face three diagonal entries (corner k) and three for side k, [`NONE`] where there is none.
     slots: Per<FaceId, [u32; 6]>,
     cholesky: Cholesky,
 }
 
 const NONE: u32 = u32::MAX;
 
+/// The unknown of every vertex, and how many there are.
+fn unknowns(surface: &Surface) -> (Per<VertexId, u32>, usize) {
+    let mut row = Per::filled(surface.positions().len(), NONE);
+    let mut rows = 0;
+    let mut next = || {
+        rows += 1;
+        rows as u32 - 1
+    };
+    // Without a rim the first vertex is held.
+    let held = usize::from(surface.rims().is_empty());
+    for vertex in surface.positions().ids().skip(held) {
+        if !surface.on_rim(vertex) {
+            row[vertex] = next();
+        }
+    }
+    for rim in surface.rims().iter().skip(1) {
+        let shared = next();
+        rim.iter().for_each(|&vertex| row[vertex] = shared);
+    }
+    (row, rows)
+}
+
 impl<'a> MetricSolver<'a> {
-    /// Prepares the solver of a surface with at least one rim.
+    /// Prepares the solver.
     ///
     /// # Errors
     /// [`ConformalError::ZeroLength`] for an edge without length, or out of memory.
     pub fn new(surface: &'a Surface) -> Result<Self, ConformalError> {
-        let mut row = Per::filled(surface.positions().len(), NONE);
-        let mut rows = 0;
-        for vertex in surface.positions().ids() {
-            if !surface.on_rim(vertex) {
-                row[vertex] = rows as u32;
-                rows += 1;
-            }
-        }
+        let (row, rows) = unknowns(surface);
         let mut log_length = Vec::with_capacity(surface.faces().len());
         for (face, v) in surface.faces().iter_ids() {
             let p = surface.corners(face);
@@ -124,7 +142,7 @@ impl<'a> MetricSolver<'a> {
         }
         let inner_edges = surface.edges().filter_map(|h| {
             let (i, j) = (row[surface.tail(h)], row[surface.head(h)]);
-            (i != NONE && j != NONE).then_some((i, j))
+            (i != NONE && j != NONE && i != j).then_some((i, j))
         });
         let cholesky = Cholesky::new(Pattern::new(rows, inner_edges))?;
         let slot = |i: u32, j: u32| -> u32 {
@@ -160,19 +178,21 @@ impl<'a> MetricSolver<'a> {
         })
     }
 
-    /// Gradient Θ − Σα at `u` into `gradient`, Hessian values into `hessian` if asked; returns the broken faces' number.
+    /// The surface that it solves for.
+    pub fn surface(&self) -> &'a Surface {
+        self.surface
+    }
+
+    /// Gradient Θ − Σα at `u` into `gradient`, Hessian values into `hessian`; returns the number of broken faces.
     fn evaluate(
         &self,
         u: &[f64],
         target: &[f64],
         gradient: &mut [f64],
-        hessian: Option<&mut [f64]>,
+        hessian: &mut [f64],
     ) -> usize {
         gradient.copy_from_slice(target);
-        let mut hessian = hessian;
-        if let Some(values) = hessian.as_deref_mut() {
-            values.fill(0.0);
-        }
+        hessian.fill(0.0);
         let mut broken = 0;
         for (face, v) in self.surface.faces().iter_ids() {
             let row = v.map(|v| self.row[v]);
@@ -191,50 +211,43 @@ impl<'a> MetricSolver<'a> {
                     gradient[row[(k + 2) % 3] as usize] -= angle[k];
                 }
             }
-            if let Some(values) = hessian.as_deref_mut() {
-                let slots = &self.slots[face];
-                for k in 0..3 {
-                    let half = 0.5 * cot[k];
-                    for corner in [k, (k + 1) % 3] {
-                        if slots[corner] != NONE {
-                            values[slots[corner] as usize] += half;
-                        }
+            let slots = &self.slots[face];
+            for k in 0..3 {
+                // Along a rim both ends are one unknown, and their difference is nothing.
+                if row[k] == row[(k + 1) % 3] {
+                    continue;
+                }
+                let half = 0.5 * cot[k];
+                for corner in [k, (k + 1) % 3] {
+                    if slots[corner] != NONE {
+                        hessian[slots[corner] as usize] += half;
                     }
-                    if slots[3 + k] != NONE {
-                        values[slots[3 + k] as usize] -= half;
-                    }
+                }
+                if slots[3 + k] != NONE {
+                    hessian[slots[3 + k] as usize] -= half;
                 }
             }
         }
         broken
     }
 
-    /// The metric with the given cones and a flat rest. Every cone must be an interior vertex.
+    /// The metric with the given singularities, flat everywhere else.
     ///
     /// # Errors
-    /// [`ConformalError::NotConverged`] with the worst vertex; interruption.
+    /// What [`Singularities::check`] finds; [`ConformalError::NotConverged`] with the worst vertex; interruption.
     pub fn solve(
         &mut self,
-        cones: &[Cone],
+        singularities: &Singularities,
         progress: &dyn Progress,
     ) -> Result<Metric, ConformalError> {
-        let mut target = vec![2.0 * PI; self.rows];
-        for cone in cones {
-            match self.row[cone.vertex] {
-                NONE => {
-                    return Err(ConformalError::ConeOnRim {
-                        vertex: cone.vertex,
-                    });
-                }
-                row => target[row as usize] = cone.angle(),
-            }
-        }
+        singularities.check(self.surface)?;
+        let target = self.targets(singularities);
         let norm = |g: &[f64]| g.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let mut u = vec![0.0; self.rows];
         let (mut gradient, mut trial_gradient) = (vec![0.0; self.rows], vec![0.0; self.rows]);
         let (mut step, mut trial) = (vec![0.0; self.rows], vec![0.0; self.rows]);
         let mut hessian = vec![0.0; self.cholesky.pattern().entries()];
-        let mut broken = self.evaluate(&u, &target, &mut gradient, Some(&mut hessian));
+        let mut broken = self.evaluate(&u, &target, &mut gradient, &mut hessian);
         let mut residual = norm(&gradient);
         let mut steps = 0;
         while residual > ANGLE_TOLERANCE && steps < MAX_STEPS {
@@ -252,7 +265,7 @@ impl<'a> MetricSolver<'a> {
                 for ((t, u), s) in trial.iter_mut().zip(&u).zip(&step) {
                     *t = u + length * s;
                 }
-                broken = self.evaluate(&trial, &target, &mut trial_gradient, Some(&mut hessian));
+                broken = self.evaluate(&trial, &target, &mut trial_gradient, &mut hessian);
                 let trial_slope: f64 = trial_gradient.iter().zip(&step).map(|(g, s)| g * s).sum();
                 let rest = norm(&trial_gradient);
                 if rest.is_finite() && (trial_slope <= -0.1 * slope || rest < 0.5 * residual) {
@@ -309,6 +322,23 @@ impl<'a> MetricSolver<'a> {
                 .collect();
         }
         Ok(metric)
+    }
+
+    /// What the angles of every unknown sum to: around a vertex, or along a rim.
+    fn targets(&self, singularities: &Singularities) -> Vec<f64> {
+        let mut target = vec![2.0 * PI; self.rows];
+        for cone in &singularities.cones {
+            let row = self.row[cone.vertex];
+            if row != NONE {
+                target[row as usize] = cone.angle();
+            }
+        }
+        let inner_rims = self.surface.rims().iter().skip(1);
+        for (rim, &turning) in inner_rims.zip(&singularities.turnings) {
+            target[self.row[rim[0]] as usize] =
+                PI * rim.len() as f64 - CURVATURE_UNIT * f64::from(turning);
+        }
+        target
     }
 
     /// Factors the Hessian; where broken triangles leave it singular, a growing multiple of its diagonal is added,

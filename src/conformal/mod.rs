@@ -2,19 +2,19 @@
 //!
 //! The slit sheet stretches the same in every direction, so a shape that it can take is a conformal image of the flat
 //! sheet with a scale factor λ between 1 (closed) and σ (open); see the paper, §3.1. Room by room: [`MetricSolver`]
-//! finds the scaled edge lengths (CETM), [`cut_to_rim`] opens a surface with a [`Cone`], [`Layout`] unfolds the faces
-//! and carries λ, [`flatten()`] does all of it, decides whether a cone is needed, and scales.
-//!
-//! Scope today: surfaces of disk type with no cone or one.
+//! finds the scaled edge lengths (CETM) for given [`Singularities`], [`cut_graph`] opens the surface to a disk,
+//! [`Layout`] unfolds the faces and carries λ, [`flatten()`] does all of it, decides on the singularities where they
+//! are left open, and scales.
 
 mod cone;
 mod cut;
+mod distance;
 mod layout;
 mod metric;
 mod propose;
 
-pub use cone::{CURVATURE_UNIT, Cone};
-pub use cut::cut_to_rim;
+pub use cone::{CURVATURE_UNIT, Cone, Singularities};
+pub use cut::{Segment, cut_graph};
 pub use layout::{Layout, ScaleSummary, Transition};
 pub use metric::{Metric, MetricSolver};
 pub use propose::{ConeRequest, FlattenOptions, Flattened, Sizing, flatten, vertex_from_number};
@@ -26,18 +26,6 @@ use crate::mesh::VertexId;
 /// Why a surface could not be flattened.
 #[derive(Debug, thiserror::Error)]
 pub enum ConformalError {
-    /// Not of disk type.
-    #[error(
-        "the surface is not a disk: it has {rims} rims and {handles} handles. kagome flattens surfaces with exactly one rim and no handle so far; {advice}"
-    )]
-    NotADisk {
-        /// Number of rims.
-        rims: usize,
-        /// Number of handles.
-        handles: i64,
-        /// What can be done.
-        advice: &'static str,
-    },
     /// An edge without length.
     #[error("vertices {tail} and {head} lie at the same place: merge them in the mesh")]
     ZeroLength {
@@ -62,17 +50,45 @@ pub enum ConformalError {
         /// Vertices there are.
         count: usize,
     },
-    /// More than the present scope.
-    #[error("{count} cones were asked for; kagome places one at the most so far")]
-    TooManyCones {
-        /// Number asked for.
-        count: usize,
-    },
     /// Curvature that a triangle lattice cannot carry.
-    #[error("a cone of {units} units (of 120°) is not supported yet: use +1 or −1")]
+    #[error("a cone of {units} units (of 120°) cannot be made: use +1, +2, −1 or −2")]
     ConeUnits {
         /// Asked for.
         units: i32,
+    },
+    /// Two cones at one vertex.
+    #[error("two cones were asked for at vertex {vertex}: give one, with the sum of their units")]
+    ConeTwice {
+        /// The vertex.
+        vertex: VertexId,
+    },
+    /// Not one turning for each rim but the first.
+    #[error(
+        "{given} rim turnings were given, the surface needs {wanted}: one for each rim but the first"
+    )]
+    Turnings {
+        /// Given.
+        given: usize,
+        /// Needed.
+        wanted: usize,
+    },
+    /// A closed surface whose cones do not carry its curvature.
+    #[error(
+        "the cones have {given} units of curvature (of 120°) in all; this surface is closed and has exactly {wanted}: add or remove cones, or leave them to --cone auto"
+    )]
+    TotalCurvature {
+        /// Asked for.
+        given: i64,
+        /// What a closed surface of this genus has.
+        wanted: i64,
+    },
+    /// The metric does not return to itself around a handle.
+    #[error(
+        "around a handle the flat metric turns by {turn_deg:.3}°, which is no multiple of 120°, so the pattern cannot close there: move the cones, or cut the handle open"
+    )]
+    Holonomy {
+        /// The angle, degrees.
+        turn_deg: f64,
     },
     /// Newton's method stopped short.
     #[error(

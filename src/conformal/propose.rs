@@ -1,18 +1,20 @@
-//! From a surface to a layout at its true size: which cone, how large on the sheet, how long the triangle edge.
+//! From a surface to a layout at its true size: which singularities, how large on the sheet, how long the triangle edge.
 
-use super::{Cone, ConformalError, Layout, Metric, MetricSolver, ScaleSummary, cut_to_rim};
+use super::{
+    Cone, ConformalError, Layout, Metric, MetricSolver, ScaleSummary, Singularities, cut_graph,
+};
 use crate::base::progress::Progress;
 use crate::mesh::{Surface, VertexId};
 
-/// Which cones a person asks for.
+/// Which singularities a person asks for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum ConeRequest {
-    /// None if λ stays within [1, σ] without; otherwise one at the vertex of largest λ if that brings more of the
+    /// None if λ stays within [1, σ] without; otherwise one cone at the vertex of largest λ if that brings more of the
     /// surface inside.
     #[default]
     Auto,
-    /// Exactly these; an empty list is no cone.
-    Given(Vec<Cone>),
+    /// Exactly these.
+    Given(Singularities),
 }
 
 /// How large the triangles are to be.
@@ -60,40 +62,25 @@ const FLOOR_WITHOUT_CONES: f64 = 1.02;
 /// The same with cones, around which λ is steeper than one triangle can follow.
 const FLOOR_WITH_CONES: f64 = 1.08;
 
-/// Flattens a disk: decides on the cone, solves, unfolds and scales.
+/// Flattens a surface: decides on the singularities, solves, unfolds and scales.
 ///
 /// # Errors
-/// [`ConformalError`]: not a disk, a cone on the rim, no convergence, interruption.
+/// [`ConformalError`]: impossible singularities, no convergence, interruption.
 pub fn flatten(
     surface: &Surface,
     options: &FlattenOptions,
     progress: &dyn Progress,
 ) -> Result<Flattened, ConformalError> {
-    check_disk(surface)?;
     let mut solver = MetricSolver::new(surface)?;
-    let mut attempt = |cones: &[Cone]| -> Result<Flattened, ConformalError> {
-        let metric = solver.solve(cones, progress)?;
-        let cut = cones
-            .first()
-            .map_or_else(Vec::new, |cone| cut_to_rim(surface, cone.vertex));
-        let layout = Layout::unfold(surface, &metric, cones, &cut);
-        Ok(size(surface, layout, metric, options))
-    };
     match &options.cones {
-        ConeRequest::Given(cones) => {
-            check_cones(surface, cones)?;
-            attempt(cones)
-        }
+        ConeRequest::Given(given) => Flattened::solve(&mut solver, given, options, progress),
         ConeRequest::Auto => {
-            let plain = attempt(&[])?;
-            if plain.scale.max <= options.sigma {
+            let none = Singularities::none(surface);
+            let plain = Flattened::solve(&mut solver, &none, options, progress)?;
+            let Some(proposed) = plain.proposed(surface, options.sigma) else {
                 return Ok(plain);
-            }
-            let vertex = plain.scale.max_vertex;
-            if surface.on_rim(vertex) {
-                return Ok(plain);
-            }
-            let coned = attempt(&[Cone { vertex, units: 1 }])?;
+            };
+            let coned = Flattened::solve(&mut solver, &proposed, options, progress)?;
             Ok(if coned.scale.inside > plain.scale.inside {
                 coned
             } else {
@@ -147,10 +134,17 @@ fn scaled(
     let mut edge_mm = edge_for(layout.area_mm2());
     let mut floor = 1.0;
     for _ in 0..20 {
-        let scale = layout.scale_summary(surface, options.cone_clearance * edge_mm, options.sigma);
-        floor = (options.sigma * scale.min / scale.max).clamp(1.0, cap);
-        let factor = scale.min / floor;
-        layout = layout.rescaled(factor);
+        let exclude_mm = options.cone_clearance * edge_mm;
+        let scale = layout.scale_summary(surface, exclude_mm, options.sigma);
+        let room = options.sigma * scale.min / scale.max;
+        let low = if room < 1.0 {
+            layout.best_window(surface, exclude_mm, options.sigma)
+        } else {
+            scale.min
+        };
+        floor = room.clamp(1.0, cap);
+        let factor = low / floor;
+        layout.rescale(factor);
         let before = edge_mm;
         edge_mm = edge_for(layout.area_mm2());
         if (factor - 1.0).abs() < 1e-12 && (edge_mm / before - 1.0).abs() < 1e-12 {
@@ -161,54 +155,34 @@ fn scaled(
 }
 
 impl Flattened {
+    /// The map with the given singularities.
+    ///
+    /// # Errors
+    /// [`ConformalError`]: impossible singularities, no convergence, interruption.
+    pub fn solve(
+        solver: &mut MetricSolver<'_>,
+        singularities: &Singularities,
+        options: &FlattenOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self, ConformalError> {
+        let surface = solver.surface();
+        let metric = solver.solve(singularities, progress)?;
+        let cut = cut_graph(surface, &singularities.cones);
+        let layout = Layout::unfold(surface, &metric, &singularities.cones, &cut)?;
+        Ok(size(surface, layout, metric, options))
+    }
+
     /// The same map at another triangle size; nothing is solved again.
     pub fn resize(self, surface: &Surface, options: &FlattenOptions) -> Self {
         size(surface, self.unscaled, self.metric, options)
     }
-}
 
-fn check_disk(surface: &Surface) -> Result<(), ConformalError> {
-    let (rims, handles) = (surface.rims().len(), surface.genus());
-    if rims == 1 && handles == 0 {
-        return Ok(());
+    /// What may do better where this map without cones leaves [1, σ]: a cone at the vertex of largest λ.
+    pub fn proposed(&self, surface: &Surface, sigma: f64) -> Option<Singularities> {
+        let vertex = self.scale.max_vertex;
+        let outside = self.scale.max > sigma && !surface.on_rim(vertex);
+        outside.then(|| Singularities::cones(surface, vec![Cone { vertex, units: 1 }]))
     }
-    let advice = match (rims, handles) {
-        (0, _) => {
-            "this one is closed: cut a hole into it, or keep only the part that you want to cover"
-        }
-        (_, 0) => {
-            "close the holes that you do not need, or cut the surface open from one rim to the other"
-        }
-        _ => "cut the handles open, or keep only a part of the surface",
-    };
-    Err(ConformalError::NotADisk {
-        rims,
-        handles,
-        advice,
-    })
-}
-
-fn check_cones(surface: &Surface, cones: &[Cone]) -> Result<(), ConformalError> {
-    if cones.len() > 1 {
-        return Err(ConformalError::TooManyCones { count: cones.len() });
-    }
-    for cone in cones {
-        if cone.vertex.0 as usize >= surface.positions().len() {
-            return Err(ConformalError::NoSuchVertex {
-                vertex: u64::from(cone.vertex.0) + 1,
-                count: surface.positions().len(),
-            });
-        }
-        if surface.on_rim(cone.vertex) {
-            return Err(ConformalError::ConeOnRim {
-                vertex: cone.vertex,
-            });
-        }
-        if cone.units.abs() != 1 {
-            return Err(ConformalError::ConeUnits { units: cone.units });
-        }
-    }
-    Ok(())
 }
 
 /// The number that a person sees for a vertex counts from 1; this turns it into an id.

@@ -6,7 +6,7 @@ use sha2::{Digest as _, Sha256};
 use super::MakeError;
 use super::design::ConeChoice;
 use super::request::{ConePlace, ConeWish, Request, Source};
-use crate::conformal::{Cone, ConeRequest, vertex_from_number};
+use crate::conformal::{Cone, ConeRequest, Singularities, vertex_from_number};
 use crate::mesh::{ClosestPoint, Import, Sample, import_bytes, insert_point};
 
 /// A surface with the decisions about it.
@@ -107,10 +107,11 @@ pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
             }
         }
     }
+    let cones = ConeRequest::Given(Singularities::cones(&import.surface, cones));
     Ok(Loaded {
         import,
         sha256,
-        cones: ConeRequest::Given(cones),
+        cones,
         cone_choices: Some(choices),
     })
 }

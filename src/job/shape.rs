@@ -11,7 +11,9 @@ use super::request::{ConeWish, Request};
 use super::verdict::{Verdict, place};
 use crate::base::progress::Progress;
 use crate::base::units::short;
-use crate::conformal::{Cone, ConeRequest, FlattenOptions, Flattened, Sizing, flatten};
+use crate::conformal::{
+    ConeRequest, FlattenOptions, Flattened, MetricSolver, Singularities, Sizing,
+};
 use crate::linkage::{Built, Linkage, LinkageOptions, build};
 use crate::machine::Machine;
 use crate::mesh::{ClosestPoint, Surface};
@@ -96,8 +98,7 @@ struct Map {
 }
 
 /// The maps worth trying, the most promising first. With cones left to the program: without one, and, if that leaves
-/// [1, σ], with one at the vertex of largest λ; with the number of triangles to remove left open: each of
-/// [`REMOVALS`].
+/// [1, σ], with what is proposed instead; with the number of triangles to remove left open: each of [`REMOVALS`].
 fn maps(
     request: &Request,
     loaded: &Loaded,
@@ -105,43 +106,40 @@ fn maps(
     progress: &dyn Progress,
 ) -> Result<Vec<Map>, MakeError> {
     let surface = &loaded.import.surface;
-    let map = |cones: &[Cone], removal: usize| -> Result<Map, MakeError> {
+    let mut solver = MetricSolver::new(surface).map_err(MakeError::Conformal)?;
+    let mut solve = |singularities: &Singularities| -> Result<Vec<Map>, MakeError> {
         progress.start("conformal map", None);
-        let options = FlattenOptions {
+        let options = |removal: usize| FlattenOptions {
             sigma,
-            cones: ConeRequest::Given(cones.to_vec()),
+            cones: ConeRequest::Given(singularities.clone()),
             sizing: request.sizing,
             cone_clearance: clearance(removal),
         };
-        let flat = flatten(surface, &options, progress).map_err(MakeError::Conformal)?;
-        Ok(Map {
-            flat,
-            options,
+        let positive = singularities.cones.iter().any(|c| c.units > 0);
+        let removals = match request.remove_at_cone {
+            _ if !positive => vec![0],
+            Some(count) => vec![count],
+            None => REMOVALS.to_vec(),
+        };
+        let flat = Flattened::solve(&mut solver, singularities, &options(removals[0]), progress)
+            .map_err(MakeError::Conformal)?;
+        let resized = removals.into_iter().map(|removal| Map {
+            flat: flat.clone().resize(surface, &options(removal)),
+            options: options(removal),
             removal,
-        })
+        });
+        Ok(resized.collect())
     };
-    let removals = |cones: &[Cone]| match request.remove_at_cone {
-        _ if cones.is_empty() => vec![0],
-        Some(count) => vec![count],
-        None if cones.iter().all(|c| c.units <= 0) => vec![0],
-        None => REMOVALS.to_vec(),
-    };
-    let mut maps = Vec::new();
-    let cones = match &loaded.cones {
-        ConeRequest::Given(cones) => cones.clone(),
+    let mut maps = match &loaded.cones {
+        ConeRequest::Given(given) => solve(given)?,
         ConeRequest::Auto => {
-            let plain = map(&[], 0)?;
-            let (needed, vertex) = (plain.flat.scale.max, plain.flat.scale.max_vertex);
-            maps.push(plain);
-            if needed <= sigma || surface.on_rim(vertex) {
-                return Ok(maps);
+            let mut maps = solve(&Singularities::none(surface))?;
+            if let Some(proposed) = maps[0].flat.proposed(surface, sigma) {
+                maps.extend(solve(&proposed)?);
             }
-            vec![Cone { vertex, units: 1 }]
+            maps
         }
     };
-    for removal in removals(&cones) {
-        maps.push(map(&cones, removal)?);
-    }
     // A map within σ comes first, the one that removes least of those; else the one that leaves least of the surface
     // outside. The sort is stable.
     let outside = |map: &Map| {

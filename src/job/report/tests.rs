@@ -3,7 +3,7 @@
 use nalgebra::Point2;
 
 use super::*;
-use crate::conformal::{ConeRequest, FlattenOptions, Sizing, flatten};
+use crate::conformal::{ConeRequest, FlattenOptions, Singularities, Sizing, flatten};
 use crate::job::Reason;
 use crate::linkage::{Handedness, LinkageOptions, build};
 
@@ -30,7 +30,7 @@ fn job() -> Job {
     let surface = Surface::new(positions, faces).unwrap();
     let options = FlattenOptions {
         sigma: 2.0,
-        cones: ConeRequest::Given(vec![]),
+        cones: ConeRequest::Given(Singularities::default()),
         sizing: Sizing::Triangles(120.0),
         cone_clearance: 0.7,
     };
