@@ -64,7 +64,11 @@ pub struct MakeArgs {
     /// Triangles to drop at the cone: 4, 16, … [default: 4 at a positive cone, 16 where that fits better]
     #[arg(long, value_name = "N")]
     remove: Option<usize>,
-    /// Direction of the lattice in degrees; auto is along the sheet's X
+    /// How far a rim turns in degrees, a multiple of 120 (-360: a hole in a plane, 0: a tube's end); once for each rim
+    /// but the first, as `inspect` lists them [default: what needs least stretch]
+    #[arg(long = "turning", value_name = "DEG", allow_hyphen_values = true)]
+    turnings: Vec<i32>,
+    /// Direction of the lattice in degrees; auto fits it to the seams, without seams along the sheet's X
     #[arg(
         long,
         value_name = "DEG|auto",
@@ -139,16 +143,16 @@ impl std::str::FromStr for ConeArg {
 
 /// A value of `--orientation`, degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Orientation(f64);
+struct Orientation(Option<f64>);
 
 impl std::str::FromStr for Orientation {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
         if text == "auto" {
-            return Ok(Self(0.0));
+            return Ok(Self(None));
         }
         match text.parse::<f64>() {
-            Ok(deg) if deg.abs() <= 360.0 => Ok(Self(deg)),
+            Ok(deg) if deg.abs() <= 360.0 => Ok(Self(Some(deg))),
             _ => Err(format!(
                 "{text:?} is not auto or an angle in degrees between -360 and 360"
             )),
@@ -230,7 +234,8 @@ fn decided_by_design(args: &MakeArgs) -> Vec<&'static str> {
         (args.kerf.is_some(), "--kerf"),
         (!args.cones.is_empty(), "--cone"),
         (args.remove.is_some(), "--remove"),
-        (args.orientation.0 != 0.0, "--orientation"),
+        (!args.turnings.is_empty(), "--turning"),
+        (args.orientation.0.is_some(), "--orientation"),
         (matches!(args.pattern, PatternArg::Left), "--pattern"),
         (args.mirror, "--mirror"),
         (matches!(args.solver, SolverArg::Projection), "--solver"),
@@ -263,6 +268,17 @@ fn from_design(args: &MakeArgs) -> Result<Request, Failure> {
     Ok(request)
 }
 
+/// Turnings in units of 120°; `None` if the program is to choose.
+fn turning_wish(degrees: &[i32]) -> Result<Option<Vec<i32>>, Failure> {
+    if let Some(wrong) = degrees.iter().find(|deg| *deg % 120 != 0) {
+        return Err(Failure::Bad(format!(
+            "--turning {wrong}: a rim turns by a multiple of 120°, so that the pattern closes around it"
+        )));
+    }
+    let units = degrees.iter().map(|deg| deg / 120).collect();
+    Ok(Some(units).filter(|_| !degrees.is_empty()))
+}
+
 fn from_arguments(args: &MakeArgs) -> Result<Request, Failure> {
     let name = &args.surface.surface;
     let source = match name.strip_prefix("sample:") {
@@ -286,6 +302,7 @@ fn from_arguments(args: &MakeArgs) -> Result<Request, Failure> {
             (None, count) => Sizing::Triangles(count.unwrap_or(DEFAULT_TRIANGLES)),
         },
         cones: cone_wish(&args.cones)?,
+        turnings: turning_wish(&args.turnings)?,
         orientation_deg: args.orientation.0,
         handedness: match args.pattern {
             PatternArg::Right => Handedness::Right,

@@ -17,7 +17,9 @@ pub use cone::{CURVATURE_UNIT, Cone, Singularities};
 pub use cut::{Segment, cut_graph};
 pub use layout::{Layout, ScaleSummary, Transition};
 pub use metric::{Metric, MetricSolver};
-pub use propose::{ConeRequest, FlattenOptions, Flattened, Sizing, flatten, vertex_from_number};
+pub use propose::{
+    ConeRequest, FlattenOptions, Flattened, Sizing, choose_turnings, flatten, vertex_from_number,
+};
 
 use crate::base::progress::Interrupted;
 use crate::base::sparse::FactorError;

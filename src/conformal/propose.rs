@@ -1,7 +1,8 @@
 //! From a surface to a layout at its true size: which singularities, how large on the sheet, how long the triangle edge.
 
 use super::{
-    Cone, ConformalError, Layout, Metric, MetricSolver, ScaleSummary, Singularities, cut_graph,
+    CURVATURE_UNIT, Cone, ConformalError, Layout, Metric, MetricSolver, ScaleSummary,
+    Singularities, cut_graph,
 };
 use crate::base::progress::Progress;
 use crate::mesh::{Surface, VertexId};
@@ -49,6 +50,8 @@ pub struct Flattened {
     unscaled: Layout,
     /// The metric behind it.
     pub metric: Metric,
+    /// The singularities that it has.
+    pub singularities: Singularities,
     /// Triangle edge L, millimetres.
     pub edge_mm: f64,
     /// λ over the layout.
@@ -75,12 +78,11 @@ pub fn flatten(
     match &options.cones {
         ConeRequest::Given(given) => Flattened::solve(&mut solver, given, options, progress),
         ConeRequest::Auto => {
-            let none = Singularities::none(surface);
-            let plain = Flattened::solve(&mut solver, &none, options, progress)?;
-            let Some(proposed) = plain.proposed(surface, options.sigma) else {
+            let plain = choose_turnings(&mut solver, &[], options, progress)?;
+            let Some(cone) = plain.proposed_cone(surface, options.sigma) else {
                 return Ok(plain);
             };
-            let coned = Flattened::solve(&mut solver, &proposed, options, progress)?;
+            let coned = choose_turnings(&mut solver, &[cone], options, progress)?;
             Ok(if coned.scale.inside > plain.scale.inside {
                 coned
             } else {
@@ -96,6 +98,7 @@ fn size(
     surface: &Surface,
     unscaled: Layout,
     metric: Metric,
+    singularities: Singularities,
     options: &FlattenOptions,
 ) -> Flattened {
     let (mut layout, mut edge_mm, mut floor) = scaled(surface, &unscaled, options, options.sizing);
@@ -107,6 +110,7 @@ fn size(
         layout,
         unscaled,
         metric,
+        singularities,
         edge_mm,
         scale,
         floor,
@@ -169,20 +173,74 @@ impl Flattened {
         let metric = solver.solve(singularities, progress)?;
         let cut = cut_graph(surface, &singularities.cones);
         let layout = Layout::unfold(surface, &metric, &singularities.cones, &cut)?;
-        Ok(size(surface, layout, metric, options))
+        Ok(size(
+            surface,
+            layout,
+            metric,
+            singularities.clone(),
+            options,
+        ))
     }
 
     /// The same map at another triangle size; nothing is solved again.
     pub fn resize(self, surface: &Surface, options: &FlattenOptions) -> Self {
-        size(surface, self.unscaled, self.metric, options)
+        size(
+            surface,
+            self.unscaled,
+            self.metric,
+            self.singularities,
+            options,
+        )
     }
 
     /// What may do better where this map without cones leaves [1, σ]: a cone at the vertex of largest λ.
-    pub fn proposed(&self, surface: &Surface, sigma: f64) -> Option<Singularities> {
+    pub fn proposed_cone(&self, surface: &Surface, sigma: f64) -> Option<Cone> {
         let vertex = self.scale.max_vertex;
         let outside = self.scale.max > sigma && !surface.on_rim(vertex);
-        outside.then(|| Singularities::cones(surface, vec![Cone { vertex, units: 1 }]))
+        outside.then_some(Cone { vertex, units: 1 })
     }
+}
+
+/// The map with these cones and the turnings of the rims that need least stretch. The search starts from how far the
+/// rims turn on the surface itself and goes on by one unit at one rim while that helps.
+///
+/// # Errors
+/// [`ConformalError`]: impossible cones, no convergence, interruption.
+pub fn choose_turnings(
+    solver: &mut MetricSolver<'_>,
+    cones: &[Cone],
+    options: &FlattenOptions,
+    progress: &dyn Progress,
+) -> Result<Flattened, ConformalError> {
+    let surface = solver.surface();
+    let turnings: Vec<i32> = surface
+        .rims()
+        .iter()
+        .skip(1)
+        .map(|rim| (surface.rim_turning(rim) / CURVATURE_UNIT).round() as i32)
+        .collect();
+    let stretch = |flat: &Flattened| flat.scale.max / flat.scale.min;
+    let start = Singularities {
+        cones: cones.to_vec(),
+        turnings,
+    };
+    let mut best = Flattened::solve(solver, &start, options, progress)?;
+    let mut improved = true;
+    while improved {
+        improved = false;
+        for rim in 0..start.turnings.len() {
+            for step in [-1, 1] {
+                let mut tried = best.singularities.clone();
+                tried.turnings[rim] += step;
+                let flat = Flattened::solve(solver, &tried, options, progress)?;
+                if stretch(&flat) < stretch(&best) {
+                    best = flat;
+                    improved = true;
+                }
+            }
+        }
+    }
+    Ok(best)
 }
 
 /// The number that a person sees for a vertex counts from 1; this turns it into an id.

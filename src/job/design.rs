@@ -87,8 +87,11 @@ pub struct LinkageChoice {
     pub orientation_deg: f64,
     /// Which of the two slit patterns.
     pub pattern: Handedness,
-    /// Triangles dropped at the cone.
+    /// Triangles dropped at each positive cone.
     pub remove_at_cone: usize,
+    /// How far each rim but the first turns, multiples of 120°.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rim_turnings_deg: Vec<i32>,
 }
 
 /// `[solve]`.
@@ -177,6 +180,12 @@ impl Design {
             -360.0,
             360.0,
         )?;
+        if let Some(wrong) = self.linkage.rim_turnings_deg.iter().find(|t| *t % 120 != 0) {
+            return Err(Complaint::new(
+                "linkage.rim_turnings_deg",
+                format!("has {wrong}, which is no multiple of 120"),
+            ));
+        }
         ranged(
             "solve.accept_distance",
             self.solve.accept_distance,
@@ -249,7 +258,14 @@ impl Design {
             mirror: self.sheet.mirror,
             sizing: Sizing::EdgeMm(self.linkage.edge_mm),
             cones: ConeWish::Given(cones),
-            orientation_deg: self.linkage.orientation_deg,
+            turnings: Some(
+                self.linkage
+                    .rim_turnings_deg
+                    .iter()
+                    .map(|t| t / 120)
+                    .collect(),
+            ),
+            orientation_deg: Some(self.linkage.orientation_deg),
             handedness: self.linkage.pattern,
             remove_at_cone: Some(self.linkage.remove_at_cone),
             solver: self.solve.solver,

@@ -6,7 +6,7 @@ use sha2::{Digest as _, Sha256};
 use super::MakeError;
 use super::design::ConeChoice;
 use super::request::{ConePlace, ConeWish, Request, Source};
-use crate::conformal::{Cone, ConeRequest, Singularities, vertex_from_number};
+use crate::conformal::{Cone, vertex_from_number};
 use crate::mesh::{ClosestPoint, Import, Sample, import_bytes, insert_point};
 
 /// A surface with the decisions about it.
@@ -15,8 +15,8 @@ pub(crate) struct Loaded {
     pub import: Import,
     /// SHA-256 of the mesh file, hexadecimal.
     pub sha256: Option<String>,
-    /// Cones, as vertices.
-    pub cones: ConeRequest,
+    /// Cones, as vertices; `None` while the program decides.
+    pub cones: Option<Vec<Cone>>,
     /// As they will stand in the design file; `None` while the program decides.
     pub cone_choices: Option<Vec<ConeChoice>>,
 }
@@ -61,7 +61,7 @@ pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
             return Ok(Loaded {
                 import,
                 sha256,
-                cones: ConeRequest::Auto,
+                cones: None,
                 cone_choices: None,
             });
         }
@@ -107,11 +107,10 @@ pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
             }
         }
     }
-    let cones = ConeRequest::Given(Singularities::cones(&import.surface, cones));
     Ok(Loaded {
         import,
         sha256,
-        cones,
+        cones: Some(cones),
         cone_choices: Some(choices),
     })
 }

@@ -212,9 +212,10 @@ fn decided(
         },
         linkage: LinkageChoice {
             edge_mm: shape.flat.edge_mm,
-            orientation_deg: request.orientation_deg,
+            orientation_deg: shape.orientation_deg,
             pattern: request.handedness,
             remove_at_cone: shape.removed,
+            rim_turnings_deg: shape.turnings.iter().map(|t| 120 * t).collect(),
         },
         solve: SolveChoice {
             solver: request.solver,

@@ -63,8 +63,10 @@ pub struct Request {
     pub sizing: Sizing,
     /// Cones.
     pub cones: ConeWish,
-    /// Lattice direction, degrees.
-    pub orientation_deg: f64,
+    /// Turning of each rim but the first in units of 120°; `None`: what needs least stretch.
+    pub turnings: Option<Vec<i32>>,
+    /// Lattice direction, degrees; `None`: what fits the seams.
+    pub orientation_deg: Option<f64>,
     /// Slit pattern.
     pub handedness: Handedness,
     /// Triangles to drop at the cone; `None`: at a positive cone 4, or 16 where λ asks for it.
@@ -92,7 +94,8 @@ impl Request {
             mirror: false,
             sizing: Sizing::Triangles(DEFAULT_TRIANGLES),
             cones: ConeWish::Auto,
-            orientation_deg: 0.0,
+            turnings: None,
+            orientation_deg: None,
             handedness: Handedness::Right,
             remove_at_cone: None,
             solver: Solver::Exact,

@@ -12,9 +12,10 @@ use super::verdict::{Verdict, place};
 use crate::base::progress::Progress;
 use crate::base::units::short;
 use crate::conformal::{
-    ConeRequest, FlattenOptions, Flattened, MetricSolver, Singularities, Sizing,
+    Cone, ConeRequest, FlattenOptions, Flattened, MetricSolver, Singularities, Sizing,
+    choose_turnings,
 };
-use crate::linkage::{Built, Linkage, LinkageOptions, build};
+use crate::linkage::{Built, Linkage, LinkageOptions, build, fit};
 use crate::machine::Machine;
 use crate::mesh::{ClosestPoint, Surface};
 use crate::pattern::{self, Sheet};
@@ -38,8 +39,14 @@ pub(crate) struct Shape {
     pub flat: Flattened,
     /// The linkage as it was laid, before it was moved to its place on the bed.
     pub built: Built,
-    /// Triangles removed at the cone.
+    /// Triangles removed at each positive cone.
     pub removed: usize,
+    /// Turning of each rim but the first, in units of 120°.
+    pub turnings: Vec<i32>,
+    /// Direction of the lattice against the layout's X, degrees.
+    pub orientation_deg: f64,
+    /// Angle distortion that fitting the lattice to the seams added, root mean square; 0 for none.
+    pub distortion: f64,
     /// The sheet in its place on the bed; none if triangles lie on one another.
     pub sheet: Option<Sheet>,
     /// The linkage with its flat positions there.
@@ -107,22 +114,31 @@ fn maps(
 ) -> Result<Vec<Map>, MakeError> {
     let surface = &loaded.import.surface;
     let mut solver = MetricSolver::new(surface).map_err(MakeError::Conformal)?;
-    let mut solve = |singularities: &Singularities| -> Result<Vec<Map>, MakeError> {
+    let mut solve = |cones: &[Cone]| -> Result<Vec<Map>, MakeError> {
         progress.start("conformal map", None);
         let options = |removal: usize| FlattenOptions {
             sigma,
-            cones: ConeRequest::Given(singularities.clone()),
+            cones: ConeRequest::Auto,
             sizing: request.sizing,
             cone_clearance: clearance(removal),
         };
-        let positive = singularities.cones.iter().any(|c| c.units > 0);
         let removals = match request.remove_at_cone {
-            _ if !positive => vec![0],
+            _ if cones.iter().all(|c| c.units <= 0) => vec![0],
             Some(count) => vec![count],
             None => REMOVALS.to_vec(),
         };
-        let flat = Flattened::solve(&mut solver, singularities, &options(removals[0]), progress)
-            .map_err(MakeError::Conformal)?;
+        let first = options(removals[0]);
+        let flat = match &request.turnings {
+            Some(turnings) => {
+                let given = Singularities {
+                    cones: cones.to_vec(),
+                    turnings: turnings.clone(),
+                };
+                Flattened::solve(&mut solver, &given, &first, progress)
+            }
+            None => choose_turnings(&mut solver, cones, &first, progress),
+        }
+        .map_err(MakeError::Conformal)?;
         let resized = removals.into_iter().map(|removal| Map {
             flat: flat.clone().resize(surface, &options(removal)),
             options: options(removal),
@@ -131,11 +147,11 @@ fn maps(
         Ok(resized.collect())
     };
     let mut maps = match &loaded.cones {
-        ConeRequest::Given(given) => solve(given)?,
-        ConeRequest::Auto => {
-            let mut maps = solve(&Singularities::none(surface))?;
-            if let Some(proposed) = maps[0].flat.proposed(surface, sigma) {
-                maps.extend(solve(&proposed)?);
+        Some(cones) => solve(cones)?,
+        None => {
+            let mut maps = solve(&[])?;
+            if let Some(cone) = maps[0].flat.proposed_cone(surface, sigma) {
+                maps.extend(solve(&[cone])?);
             }
             maps
         }
@@ -161,7 +177,12 @@ fn attempt(
     closest: &ClosestPoint,
     progress: &dyn Progress,
 ) -> Result<Shape, MakeError> {
-    let (flat, built) = lay_out(request, surface, &map, stock.sigma, progress)?;
+    let Laid {
+        flat,
+        built,
+        orientation_deg,
+        distortion,
+    } = lay_out(request, surface, &map, stock.sigma, progress)?;
     progress.note(&describe_map(&flat, surface, stock.sigma));
     // The sheet depends on flat positions only: what does not fit the bed is known before the long solve.
     let (mut sheet, mut motion) = (None, None);
@@ -205,10 +226,14 @@ fn attempt(
         request.accept_distance,
         request.cones == ConeWish::Auto,
     );
+    let turnings = flat.singularities.turnings.clone();
     Ok(Shape {
         flat,
         built,
         removed: map.removal,
+        turnings,
+        orientation_deg,
+        distortion,
         sheet,
         linkage,
         chart,
@@ -219,6 +244,15 @@ fn attempt(
     })
 }
 
+/// A lattice laid on a map.
+struct Laid {
+    /// The map, warped so that the lattice goes on across its seams.
+    flat: Flattened,
+    built: Built,
+    orientation_deg: f64,
+    distortion: f64,
+}
+
 /// Lays the lattice. With a number of triangles asked for, the edge is corrected once for those that the rim costs.
 fn lay_out(
     request: &Request,
@@ -226,31 +260,75 @@ fn lay_out(
     map: &Map,
     sigma: f64,
     progress: &dyn Progress,
-) -> Result<(Flattened, Built), MakeError> {
-    let lattice = |flat: &Flattened| LinkageOptions {
-        edge_mm: flat.edge_mm,
-        orientation: request.orientation_deg.to_radians(),
-        handedness: request.handedness,
-        remove_at_cone: map.removal,
-        sigma,
+) -> Result<Laid, MakeError> {
+    let resized = |sizing: Sizing| {
+        let options = FlattenOptions {
+            sizing,
+            ..map.options.clone()
+        };
+        map.flat.clone().resize(surface, &options)
     };
-    let mut flat = map.flat.clone();
-    let mut built =
-        build(surface, &flat.layout, &lattice(&flat), progress).map_err(MakeError::Linkage)?;
-    if let Sizing::Triangles(wanted) = request.sizing {
-        let got = built.linkage.triangles.len() as f64;
-        let sizing = Sizing::Triangles(wanted * wanted / got);
-        flat = flat.resize(
+    let lay = |sizing: Sizing| -> Result<Laid, MakeError> {
+        let mut flat = resized(sizing);
+        let mut orientation_deg = request.orientation_deg;
+        if let Sizing::Triangles(_) = sizing {
+            let free = fit(
+                surface,
+                &flat.layout,
+                flat.edge_mm,
+                false,
+                orientation_deg,
+                progress,
+            )
+            .map_err(MakeError::Linkage)?;
+            orientation_deg = Some(free.orientation_deg);
+            flat = resized(Sizing::EdgeMm(free.edge_mm));
+        }
+        // Whatever chose edge and orientation, the result is the one that these two alone would give, to the last bit.
+        let first = fit(
             surface,
-            &FlattenOptions {
-                sizing,
-                ..map.options.clone()
-            },
-        );
-        built =
-            build(surface, &flat.layout, &lattice(&flat), progress).map_err(MakeError::Linkage)?;
+            &flat.layout,
+            flat.edge_mm,
+            true,
+            orientation_deg,
+            progress,
+        )
+        .map_err(MakeError::Linkage)?;
+        let fitted = match orientation_deg {
+            Some(_) => first,
+            None => fit(
+                surface,
+                &flat.layout,
+                flat.edge_mm,
+                true,
+                Some(first.orientation_deg),
+                progress,
+            )
+            .map_err(MakeError::Linkage)?,
+        };
+        let lattice = LinkageOptions {
+            edge_mm: fitted.edge_mm,
+            orientation: fitted.orientation_deg.to_radians(),
+            handedness: request.handedness,
+            remove_at_cone: map.removal,
+            sigma,
+        };
+        let built =
+            build(surface, &fitted.layout, &lattice, progress).map_err(MakeError::Linkage)?;
+        flat.layout = fitted.layout;
+        Ok(Laid {
+            flat,
+            built,
+            orientation_deg: fitted.orientation_deg,
+            distortion: fitted.distortion,
+        })
+    };
+    let laid = lay(request.sizing)?;
+    if let Sizing::Triangles(wanted) = request.sizing {
+        let got = laid.built.linkage.triangles.len() as f64;
+        return lay(Sizing::Triangles(wanted * wanted / got));
     }
-    Ok((flat, built))
+    Ok(laid)
 }
 
 /// Radius around a cone, in L, that no triangle's centre comes within: 1/√3 with all triangles in place, 2/√3 without
@@ -264,18 +342,31 @@ fn clearance(removal: usize) -> f64 {
     }
 }
 
-/// One line about the map: the cone, λ, the edge length.
+/// One line about the map: the cones, λ, the edge length.
 fn describe_map(flat: &Flattened, surface: &Surface, sigma: f64) -> String {
-    let cone = match flat.layout.cones.first() {
-        Some(cone) => format!(
-            "one cone at vertex {} {}",
-            cone.vertex,
-            place(surface.position(cone.vertex))
-        ),
-        None => "no cone".into(),
+    let cones: Vec<String> = flat
+        .layout
+        .cones
+        .iter()
+        .map(|c| format!("{:+} at {}", c.units, place(surface.position(c.vertex))))
+        .collect();
+    let cones = match cones.len() {
+        0 => "no cone".to_owned(),
+        1 => format!("one cone, {}", cones[0]),
+        n => format!("{n} cones, {}", cones.join(", ")),
+    };
+    let turnings: Vec<String> = flat
+        .singularities
+        .turnings
+        .iter()
+        .map(|t| format!("{}°", 120 * t))
+        .collect();
+    let rims = match turnings.len() {
+        0 => String::new(),
+        _ => format!("; inner rims turning by {}", turnings.join(", ")),
     };
     format!(
-        "conformal map: {cone}; λ from {} to {} (σ = {}), triangle edge {} mm",
+        "conformal map: {cones}{rims}; λ from {} to {} (σ = {}), triangle edge {} mm",
         short(flat.scale.min, 3),
         short(flat.scale.max, 3),
         short(sigma, 3),

@@ -198,6 +198,13 @@ pub(crate) fn figures(
             "newton_steps": flat.metric.steps,
             "angle_residual_rad": flat.metric.residual,
             "closure": flat.layout.closure,
+            "cones": flat.singularities.cones.iter().map(|c| json!({
+                "vertex": u64::from(c.vertex.0) + 1,
+                "at_mm": surface.position(c.vertex).coords.as_slice(),
+                "units": c.units,
+            })).collect::<Vec<_>>(),
+            "rim_turnings_deg": shape.turnings.iter().map(|t| 120 * t).collect::<Vec<_>>(),
+            "distortion_of_fit": shape.distortion,
             "broken_faces": flat.metric.broken.len(),
             "lambda_min": flat.scale.min,
             "lambda_max": flat.scale.max,

@@ -46,6 +46,20 @@ impl Lattice {
         Point2::new(z.re, z.im)
     }
 
+    /// The lattice vertex nearest to a chart point.
+    pub(crate) fn nearest(&self, at: Complex<f64>) -> Complex<f64> {
+        let (i, j) = self.coordinates(Point2::new(at.re, at.im));
+        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
+        corners
+            .map(|(a, b)| {
+                let p = self.point(i.floor() + a, j.floor() + b);
+                Complex::new(p.x, p.y)
+            })
+            .into_iter()
+            .min_by(|a, b| (a - at).norm_sqr().total_cmp(&(b - at).norm_sqr()))
+            .unwrap_or(at)
+    }
+
     /// The centroid of a triangle.
     #[inline]
     pub(crate) fn centroid(&self, key: Key) -> Point2<f64> {

@@ -6,6 +6,7 @@
 //! [`write_obj`] is the format that other programs read.
 
 mod clip;
+mod continuity;
 mod lattice;
 mod lift;
 mod obj;
@@ -15,12 +16,14 @@ mod walk;
 
 use nalgebra::{Point2, Point3};
 
+pub use continuity::{Fitted, SIZE_ROOM, fit};
 pub use lattice::Lattice;
 pub use lift::opening_turn;
 pub use obj::write_obj;
 pub use types::{Cell, Colour, Corner, Handedness, Hinge, Linkage, PointId, Triangle, TriangleId};
 
 use crate::base::progress::{Interrupted, Progress};
+use crate::base::sparse::FactorError;
 use crate::conformal::Layout;
 use crate::mesh::Surface;
 
@@ -85,6 +88,17 @@ pub enum LinkageError {
         /// Largest number.
         limit: usize,
     },
+    /// No lattice of about this size goes on across the seams.
+    #[error(
+        "no lattice of triangles of about {edge_mm:.2} mm goes on across the seams without folding the sheet: two cones are too close to each other for it; ask for smaller triangles (--triangles or --edge), or for other cones"
+    )]
+    NoLattice {
+        /// Edge asked for.
+        edge_mm: f64,
+    },
+    /// The linear system of a warp failed.
+    #[error(transparent)]
+    Factor(#[from] FactorError),
     /// The person asked to stop.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),

@@ -98,11 +98,7 @@ impl Inspection {
                         .zip(next)
                         .map(|(a, b)| (surface.position(*b) - surface.position(*a)).norm())
                         .sum(),
-                    turning_deg: rim
-                        .iter()
-                        .map(|v| flat / 2.0 - angle_sum[*v])
-                        .sum::<f64>()
-                        .to_degrees(),
+                    turning_deg: surface.rim_turning(rim).to_degrees(),
                 }
             })
             .collect();

@@ -3,6 +3,8 @@
 //! The topology is stored per *halfedge*: side `k` of face `f`, from its corner `k` to corner `k + 1`, faces
 //! counter-clockwise seen from outside. A halfedge without a twin lies on a rim.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Point3, Vector3};
 
 use crate::base::ids::{Id, Per, typed_id};
@@ -277,6 +279,17 @@ impl Surface {
             Vector3::y()
         };
         (normal, up)
+    }
+    /// Turning of a rim: its total geodesic curvature with the surface on the left, radians.
+    pub fn rim_turning(&self, rim: &[VertexId]) -> f64 {
+        let angle = |h: HalfedgeId| {
+            let (p, k) = (self.corners(h.face()), h.corner());
+            let (u, v) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
+            u.cross(&v).norm().atan2(u.dot(&v))
+        };
+        rim.iter()
+            .map(|&v| PI - self.around(v).map(angle).sum::<f64>())
+            .sum()
     }
     /// V − E + F.
     pub fn euler_characteristic(&self) -> i64 {
