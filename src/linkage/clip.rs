@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use nalgebra::Point2;
 
 use super::lattice::{Key, Lattice, across};
+use super::net::Net;
 use super::walk::Walker;
 use super::{Colour, LinkageError};
 use crate::base::progress::Progress;
@@ -313,18 +314,46 @@ pub(crate) fn core(laid: &[Laid], keep: impl Fn(usize) -> bool) -> (Vec<Laid>, u
     (kept, lost)
 }
 
-/// The `count` triangles nearest to the chart's origin (the cone), by distance and then by number.
-pub(crate) fn nearest_to_origin(laid: &[Laid], count: usize) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..laid.len()).collect();
-    let distance = |n: usize| {
-        let c = &laid[n].corners;
-        let radius = ((c[0].coords + c[1].coords + c[2].coords) / 3.0).norm();
-        // Rounded, so that the triangles of one ring tie however the cone was cut.
-        (radius * 1e6).round() as i64
-    };
-    order.sort_by_key(|&n| (distance(n), n));
-    order.truncate(count);
-    order
+/// The triangles to remove at cones: `count` around each vertex of four triangles, nearest first, ring by ring, and in
+/// proportion around one of two, whose own two go in any case: they share two sides and cannot both be hinged.
+pub(crate) fn around_cones(laid: &[Laid], count: usize) -> Vec<bool> {
+    let net = Net::new(laid);
+    let mut at_node = vec![Vec::new(); net.flat.len()];
+    for (side, &node) in net
+        .node
+        .iter()
+        .enumerate()
+        .filter(|(_, node)| !net.rim[**node])
+    {
+        at_node[node].push(side / 3);
+    }
+    let mut removed = vec![false; laid.len()];
+    for node in (0..at_node.len()).filter(|&node| !net.rim[node]) {
+        let size = at_node[node].len();
+        if size >= 6 {
+            continue;
+        }
+        let wanted = (count * size)
+            .div_ceil(4)
+            .max(if size < 3 { size } else { 0 });
+        let mut taken = Vec::new();
+        let mut ring = at_node[node].clone();
+        while taken.len() < wanted && !ring.is_empty() {
+            ring.sort_unstable();
+            ring.dedup();
+            ring.retain(|t| !taken.contains(t));
+            ring.truncate(wanted - taken.len());
+            taken.extend(&ring);
+            ring = ring
+                .iter()
+                .flat_map(|&t| 3 * t..3 * t + 3)
+                .flat_map(|side| &at_node[net.node[side]])
+                .copied()
+                .collect();
+        }
+        taken.iter().for_each(|&t| removed[t] = true);
+    }
+    removed
 }
 
 #[cfg(test)]

@@ -9,7 +9,9 @@ mod clip;
 mod continuity;
 mod lattice;
 mod lift;
+mod net;
 mod obj;
+mod pieces;
 mod seam;
 mod types;
 mod walk;
@@ -36,7 +38,8 @@ pub struct LinkageOptions {
     pub orientation: f64,
     /// Which of the two slit patterns.
     pub handedness: Handedness,
-    /// Triangles to drop around the cone: 4 are those at it, 16 those and the ring around them.
+    /// Triangles to drop around each cone of +1 unit: 4 are those at it, 16 those and the ring around them. In
+    /// proportion at sharper cones, where two triangles go in any case; none at negative ones.
     pub remove_at_cone: usize,
     /// Largest scale factor: the lift opens no farther.
     pub sigma: f64,
@@ -51,10 +54,12 @@ pub struct Built {
     pub start: Vec<Point3<f64>>,
     /// Triangles that lay on the surface but hung by fewer than two others, or were not part of the largest piece.
     pub lost: usize,
-    /// Triangles removed at the cone, as asked.
+    /// Triangles removed at cones, as asked.
     pub removed: usize,
-    /// Pairs of triangles that lie on one another on the sheet.
+    /// Pairs of triangles that lie on one another on the sheet: none, or a mistake of this program.
     pub overlaps: Vec<(TriangleId, TriangleId)>,
+    /// Pieces of the sheet: more than one where it would lie on itself otherwise.
+    pub pieces: usize,
     /// Length of the seam in lattice edges; 0 without.
     pub seam_edges: usize,
 }
@@ -135,19 +140,14 @@ pub fn build(
     }
     let lattice = Lattice::new(edge_mm, options.orientation);
     let laid = clip::lay(surface, layout, &lattice, edge_mm, progress)?;
-    let mut dropped = vec![false; laid.len()];
-    if !layout.cones.is_empty() {
-        for n in clip::nearest_to_origin(&laid, options.remove_at_cone) {
-            dropped[n] = true;
-        }
-    }
+    let dropped = clip::around_cones(&laid, options.remove_at_cone);
     let removed = dropped.iter().filter(|d| **d).count();
     let (kept, lost) = clip::core(&laid, |n| !dropped[n]);
     if kept.is_empty() {
         return Err(nothing());
     }
     progress.check()?;
-    let flat = seam::flatten(&kept, &lattice, middle(&kept));
+    let flat = pieces::flatten(&kept, &lattice, middle(&kept), &|_, _| 1.0);
     let cells: Vec<Cell> = kept
         .iter()
         .zip(&flat.corners)
@@ -166,6 +166,7 @@ pub fn build(
         lost,
         removed,
         overlaps: flat.overlaps.iter().map(|&(a, b)| (id(a), id(b))).collect(),
+        pieces: flat.pieces,
         seam_edges: flat.seam_edges,
     })
 }

@@ -1,295 +1,421 @@
-//! Lays the triangles flat on the sheet, cut open along lattice lines where cones forbid one piece.
+//! Chooses where the linkage is cut open, so that its triangles can lie flat.
 //!
 //! The cut that unfolded the mesh is of no use on the sheet: it runs along mesh edges. Here the seam is chosen anew
-//! as the shortest path over lattice edges, straight where possible, from every cone (or the hole left where its
-//! triangles were removed) to the outer rim. Flat positions are whole lattice positions, found by unfolding triangle
-//! by triangle.
+//! along lattice edges: a tree that joins all nodes with a holonomy (a cone, the hole left where its triangles were
+//! removed, a rim around which the pattern turns or shifts), nearest first, straight where possible; then the loops
+//! that open every handle, by the greedy homotopy generators of Erickson and Whittlesey (2005): a tree of shortest
+//! ways, a maximum spanning tree of the triangles that crosses none of them, and one loop for each side left over.
+//!
+//! A vertex with eight triangles must not be the tree's leaf: 480° do not lie flat. It gets a second way out, and the
+//! dearest part of the seam that this makes superfluous is closed again. Where none does, the sheet falls in two.
 
 use std::cmp::Reverse;
-use std::collections::{BinaryHeap, HashMap, VecDeque};
+use std::collections::BinaryHeap;
 
-use nalgebra::Point2;
-
-use super::Colour;
-use super::clip::Laid;
-use super::lattice::{Key, Lattice, corner_indices};
+use super::net::{Net, next};
 
 /// Price of a turn by 60° at a vertex of the seam, in edges. A seam with fewer corners is easier to close by hand;
 /// half an edge still prefers a way that is one edge shorter to one with two corners fewer.
 const TURN_PRICE: u64 = 5;
 /// Price of an edge, in the same units.
-const EDGE_PRICE: u64 = 10;
+const EDGE_PRICE: f64 = 10.0;
+/// Most triangles of one vertex in one piece where it is cut: with six, both sides of the cut would lie on one line.
+const MOST_IN_SECTOR: usize = 5;
 
-/// Flat triangles.
-#[derive(Clone, Debug)]
-pub(crate) struct Flat {
-    /// Closed corners on the sheet, millimetres, per triangle.
-    pub corners: Vec<[Point2<f64>; 3]>,
-    /// Pairs of triangles that came to lie on one another.
-    pub overlaps: Vec<(usize, usize)>,
-    /// Lattice edges of the seam.
-    pub seam_edges: usize,
+/// What the price of an edge is multiplied by, given a triangle and its side; 1 or more, and the dearer of the two
+/// sides counts.
+pub(crate) type Price<'a> = &'a dyn Fn(usize, usize) -> f64;
+
+/// How a search goes on from a node that it has reached.
+enum Onward {
+    /// Through it.
+    Pass,
+    /// Not through it.
+    Stay,
+    /// No farther at all.
+    Done,
 }
 
-/// A fan of triangles around one lattice vertex; a vertex where two fans touch is two of them.
-struct Fans {
-    /// Fan of every corner.
-    of: Vec<[usize; 3]>,
-    /// Triangles in each fan.
-    size: Vec<usize>,
-    /// True if the fan does not close: its vertex lies on a rim.
-    open: Vec<bool>,
+/// The seam being chosen.
+pub(super) struct Seam<'a> {
+    net: &'a Net,
+    /// Price of each side.
+    price: Vec<u64>,
+    /// Sides along which the sheet is cut open, from both sides.
+    pub cut: Vec<bool>,
 }
 
-impl Fans {
-    fn new(laid: &[Laid]) -> Self {
-        let mut parent: Vec<usize> = (0..3 * laid.len()).collect();
-        fn root(parent: &mut [usize], mut n: usize) -> usize {
-            while parent[n] != n {
-                parent[n] = parent[parent[n]];
-                n = parent[n];
-            }
-            n
-        }
-        for (t, triangle) in laid.iter().enumerate() {
-            for (side, neighbour) in triangle.neighbours.iter().enumerate() {
-                let Some((other, s)) = *neighbour else {
-                    continue;
-                };
-                for (mine, theirs) in [(side, (s + 1) % 3), ((side + 1) % 3, s)] {
-                    let (a, b) = (
-                        root(&mut parent, 3 * t + mine),
-                        root(&mut parent, 3 * other + theirs),
-                    );
-                    parent[a.max(b)] = a.min(b);
-                }
-            }
-        }
-        let mut number = vec![usize::MAX; parent.len()];
-        let (mut size, mut open) = (Vec::new(), Vec::new());
-        let mut of = vec![[0; 3]; laid.len()];
-        for (t, triangle) in laid.iter().enumerate() {
-            for k in 0..3 {
-                let r = root(&mut parent, 3 * t + k);
-                if number[r] == usize::MAX {
-                    number[r] = size.len();
-                    size.push(0);
-                    open.push(false);
-                }
-                let fan = number[r];
-                of[t][k] = fan;
-                size[fan] += 1;
-                open[fan] |=
-                    triangle.neighbours[k].is_none() || triangle.neighbours[(k + 2) % 3].is_none();
-            }
-        }
-        Self { of, size, open }
+impl<'a> Seam<'a> {
+    /// The seam of a net.
+    pub fn choose(net: &'a Net, price: Price<'_>) -> Self {
+        let one = |side: usize| (EDGE_PRICE * price(side / 3, side % 3).max(1.0)).round() as u64;
+        let price = (0..net.twin.len())
+            .map(|side| one(side).max(net.twin[side].map_or(0, one)))
+            .collect();
+        let mut seam = Self {
+            net,
+            price,
+            cut: vec![false; net.twin.len()],
+        };
+        let joined = seam.join();
+        seam.open_handles(&joined);
+        seam.relieve();
+        seam
     }
-}
 
-/// Rims of the linkage as loops of fans, with their turning in units of 60° (a disk's rim turns by +6).
-fn rims(laid: &[Laid], fans: &Fans) -> Vec<(Vec<usize>, i64)> {
-    let mut seen = vec![[false; 3]; laid.len()];
-    let mut loops = Vec::new();
-    for t in 0..laid.len() {
-        for s in 0..3 {
-            if seen[t][s] || laid[t].neighbours[s].is_some() {
+    fn set(&mut self, side: usize, cut: bool) {
+        self.cut[side] = cut;
+        if let Some(twin) = self.net.twin[side] {
+            self.cut[twin] = cut;
+        }
+    }
+
+    /// Joins all nodes with a holonomy by a tree: again and again the nearest. Returns the nodes on it.
+    fn join(&mut self) -> Vec<bool> {
+        let net = self.net;
+        let mut joined = vec![false; net.flat.len()];
+        // From the longest rim, which is the outer one as a rule.
+        let first = (0..net.flat.len())
+            .filter(|&n| !net.flat[n])
+            .max_by_key(|&n| {
+                (
+                    net.rim[n],
+                    if net.rim[n] { net.leaving[n].len() } else { 0 },
+                    Reverse(n),
+                )
+            })
+            .or((net.handles() > 0).then_some(0));
+        let Some(first) = first else { return joined };
+        joined[first] = true;
+        loop {
+            let starts = (0..joined.len())
+                .filter(|&n| joined[n])
+                .flat_map(|n| self.exits(n));
+            let mut reached = None;
+            let before = self.explore(starts, |_, side| {
+                let head = net.head(side);
+                match (joined[head], net.flat[head]) {
+                    (true, _) => Onward::Stay,
+                    (_, true) => Onward::Pass,
+                    _ => {
+                        reached = Some(side);
+                        Onward::Done
+                    }
+                }
+            });
+            let Some(last) = reached else { return joined };
+            for side in path(&before, last) {
+                self.set(side, true);
+                joined[net.node[side]] = true;
+                joined[net.head(side)] = true;
+            }
+        }
+    }
+
+    /// Adds loops until what is not cut has no handle.
+    fn open_handles(&mut self, joined: &[bool]) {
+        let net = self.net;
+        if net.handles() == 0 {
+            return;
+        }
+        // The tree of ways: by which side each node was reached first, and for what price.
+        let mut arrival: Vec<Option<(u64, usize)>> = vec![None; joined.len()];
+        let starts = (0..joined.len())
+            .filter(|&n| joined[n])
+            .flat_map(|n| self.exits(n));
+        self.explore(starts, |price, side| {
+            let head = net.head(side);
+            if joined[head] || arrival[head].is_some() {
+                return Onward::Stay;
+            }
+            arrival[head] = Some((price, side));
+            Onward::Pass
+        });
+        let mut taken = self.cut.clone();
+        for side in arrival.iter().flatten().map(|a| a.1) {
+            taken[side] = true;
+            net.twin[side]
+                .into_iter()
+                .for_each(|twin| taken[twin] = true);
+        }
+        let price = |node: usize| arrival[node].map_or(0, |a| a.0);
+        let mut free: Vec<(Reverse<u64>, usize, usize)> = (0..taken.len())
+            .filter(|&side| !taken[side])
+            .filter_map(|side| net.twin[side].map(|twin| (side, twin)))
+            .filter(|(side, twin)| side < twin)
+            .map(|(side, twin)| {
+                let around = price(net.node[side]) + self.price[side] + price(net.head(side));
+                (Reverse(around), side, twin)
+            })
+            .collect();
+        free.sort_unstable();
+        let mut trees = Groups::new(net.twin.len() / 3);
+        for (_, side, twin) in free {
+            if trees.join(side / 3, twin / 3) {
                 continue;
             }
-            let (mut members, mut turning) = (Vec::new(), 0i64);
-            let (mut triangle, mut side) = (t, s);
-            while !seen[triangle][side] {
-                seen[triangle][side] = true;
-                let fan = fans.of[triangle][(side + 1) % 3];
-                members.push(fan);
-                turning += 3 - fans.size[fan] as i64;
-                side = (side + 1) % 3;
-                while let Some((other, back)) = laid[triangle].neighbours[side] {
-                    (triangle, side) = (other, (back + 1) % 3);
+            self.set(side, true);
+            for mut node in [net.node[side], net.head(side)] {
+                while let Some((_, side)) = arrival[node] {
+                    self.set(side, true);
+                    node = net.node[side];
                 }
             }
-            loops.push((members, turning));
         }
     }
-    loops.sort_by_key(|(members, _)| Reverse(members.len()));
-    loops
-}
 
-/// Chooses the seam and lays every triangle flat. `root` keeps the place that it has in its chart.
-pub(crate) fn flatten(laid: &[Laid], lattice: &Lattice, root: usize) -> Flat {
-    let fans = Fans::new(laid);
-    let mut cut = vec![[false; 3]; laid.len()];
-    let rims = rims(laid, &fans);
-    // Where a seam may end: the outer rim, and whatever an earlier seam has reached.
-    let mut goal = vec![false; fans.size.len()];
-    if let Some((outer, _)) = rims.first() {
-        outer.iter().for_each(|&fan| goal[fan] = true);
-    }
-    let mut sources: Vec<Vec<usize>> = (0..fans.size.len())
-        .filter(|&fan| !fans.open[fan] && fans.size[fan] != 6)
-        .map(|fan| vec![fan])
-        .collect();
-    sources.extend(
-        rims.into_iter()
-            .skip(1)
-            .filter(|(_, turning)| turning.rem_euclid(6) != 0)
-            .map(|(m, _)| m),
-    );
-    let mut seam_edges = 0;
-    for source in sources {
-        if source.iter().any(|&fan| goal[fan]) {
-            continue;
-        }
-        for (t, side) in seam_path(laid, &fans, &source, &goal) {
-            cut[t][side] = true;
-            if let Some((other, back)) = laid[t].neighbours[side] {
-                cut[other][back] = true;
-            }
-            goal[fans.of[t][side]] = true;
-            seam_edges += 1;
-        }
-        source.iter().for_each(|&fan| goal[fan] = true);
-    }
-    let keys = unfold(laid, lattice, &cut, root);
-    let mut first: HashMap<Key, usize> = HashMap::with_capacity(keys.len());
-    let mut overlaps = Vec::new();
-    for (t, (key, _)) in keys.iter().enumerate() {
-        if let Some(&other) = first.get(key) {
-            overlaps.push((other, t));
-        } else {
-            first.insert(*key, t);
-        }
-    }
-    let corners = keys
-        .iter()
-        .map(|&(key, turn)| {
-            let c = lattice.corners(key);
-            std::array::from_fn(|k| c[(k + turn) % 3])
-        })
-        .collect();
-    Flat {
-        corners,
-        overlaps,
-        seam_edges,
-    }
-}
-
-/// The cheapest path from any source fan to any goal fan over sides that have triangles on both sides, as directed
-/// sides (triangle on the left).
-fn seam_path(laid: &[Laid], fans: &Fans, source: &[usize], goal: &[bool]) -> Vec<(usize, usize)> {
-    let id = |t: usize, s: usize| 3 * t + s;
-    let mut price = vec![u64::MAX; 3 * laid.len()];
-    let mut before = vec![usize::MAX; 3 * laid.len()];
-    let mut queue = BinaryHeap::new();
-    let start: std::collections::HashSet<usize> = source.iter().copied().collect();
-    for t in 0..laid.len() {
-        for s in 0..3 {
-            if start.contains(&fans.of[t][s]) && laid[t].neighbours[s].is_some() {
-                price[id(t, s)] = EDGE_PRICE;
-                queue.push(Reverse((EDGE_PRICE, id(t, s))));
-            }
-        }
-    }
-    while let Some(Reverse((so_far, here))) = queue.pop() {
-        if so_far > price[here] {
-            continue;
-        }
-        let (t, s) = (here / 3, here % 3);
-        let head = fans.of[t][(s + 1) % 3];
-        if goal[head] {
-            let mut path = Vec::new();
-            let mut at = here;
-            while at != usize::MAX {
-                path.push((at / 3, at % 3));
-                at = before[at];
-            }
-            path.reverse();
-            return path;
-        }
-        if fans.open[head] {
-            continue;
-        }
-        // Turn clockwise around the head from the sharpest left to the sharpest right; three corners on the left is
-        // straight on.
-        let (mut triangle, mut side) = (t, (s + 1) % 3);
-        for corners in 1..fans.size[head] {
-            let turn = (corners as i64 - 3).unsigned_abs();
-            let total = so_far + EDGE_PRICE + TURN_PRICE * turn * turn;
-            if laid[triangle].neighbours[side].is_some() && total < price[id(triangle, side)] {
-                price[id(triangle, side)] = total;
-                before[id(triangle, side)] = here;
-                queue.push(Reverse((total, id(triangle, side))));
-            }
-            let Some((other, back)) = laid[triangle].neighbours[side] else {
-                break;
-            };
-            (triangle, side) = (other, (back + 1) % 3);
-        }
-    }
-    Vec::new()
-}
-
-/// Lattice triangle of every triangle, and which of its corners is the triangle's corner 0, by unfolding across sides
-/// that are not cut.
-fn unfold(laid: &[Laid], lattice: &Lattice, cut: &[[bool; 3]], root: usize) -> Vec<(Key, usize)> {
-    let centre =
-        |c: &[Point2<f64>; 3]| Point2::from((c[0].coords + c[1].coords + c[2].coords) / 3.0);
-    // The lattice triangle with these corners; the first that matches tells the rotation.
-    let place = |indices: [(i32, i32); 3], colour: Colour| -> (Key, usize) {
-        let (mut i, mut j) = (i32::MAX, i32::MAX);
-        for (a, b) in indices {
-            (i, j) = (i.min(a), j.min(b));
-        }
-        let key = Key { i, j, colour };
-        let turn = corner_indices(key)
-            .iter()
-            .position(|c| *c == indices[0])
-            .unwrap_or(0);
-        (key, turn)
-    };
-    let corner = |&(key, turn): &(Key, usize), k: usize| corner_indices(key)[(k + turn) % 3];
-    let mut placed: Vec<Option<(Key, usize)>> = vec![None; laid.len()];
-    let mut queue = VecDeque::new();
-    // Every piece gets a root; the linkage is one piece unless the seam cuts it in two.
-    for seed in std::iter::once(root).chain(0..laid.len()) {
-        if placed[seed].is_some() {
-            continue;
-        }
-        let key = lattice.key_at_centroid(centre(&laid[seed].corners));
-        let corners = lattice.corners(key);
-        let nearest = |k: &usize| (corners[*k] - laid[seed].corners[0]).norm();
-        let turn = (0..3)
-            .min_by(|a, b| nearest(a).total_cmp(&nearest(b)))
-            .unwrap_or(0);
-        placed[seed] = Some((key, turn));
-        queue.push_back(seed);
-        while let Some(t) = queue.pop_front() {
-            let Some(here) = placed[t] else { continue };
-            for side in 0..3 {
-                let Some((other, back)) = laid[t].neighbours[side] else {
-                    continue;
+    /// Gives every crowded vertex as many ways out as it takes to lie flat.
+    fn relieve(&mut self) {
+        for node in 0..self.net.flat.len() {
+            // Each way halves a sector or takes five triangles from it.
+            for _ in 0..self.net.leaving[node].len() {
+                let sectors = self.sectors(node);
+                let Some(sector) = sectors.into_iter().find(|s| s.len() > MOST_IN_SECTOR) else {
+                    break;
                 };
-                if cut[t][side] || placed[other].is_some() {
-                    continue;
+                if !self.net.crowded(node) || !self.cut[sector[0]] || !self.second_way(&sector) {
+                    break;
                 }
-                let (a, b) = (corner(&here, side), corner(&here, (side + 1) % 3));
-                let c = corner(&here, (side + 2) % 3);
-                let mut indices = [(0, 0); 3];
-                indices[back] = b;
-                indices[(back + 1) % 3] = a;
-                indices[(back + 2) % 3] = (a.0 + b.0 - c.0, a.1 + b.1 - c.1);
-                placed[other] = Some(place(indices, here.0.colour.other()));
-                queue.push_back(other);
             }
         }
     }
-    let origin = (
-        Key {
-            i: 0,
-            j: 0,
-            colour: Colour::Up,
-        },
-        0,
-    );
-    placed.into_iter().map(|p| p.unwrap_or(origin)).collect()
+
+    /// The sides that leave a vertex, from each one that is cut to the one before the next; all in one if none is.
+    fn sectors(&self, node: usize) -> Vec<Vec<usize>> {
+        let mut leaving = self.net.leaving[node].clone();
+        let first = leaving.iter().position(|&side| self.cut[side]);
+        leaving.rotate_left(first.unwrap_or(0));
+        leaving
+            .chunk_by(|_, &side| !self.cut[side])
+            .map(<[usize]>::to_vec)
+            .collect()
+    }
+
+    /// Whether a node would lie flat if these sides were closed again.
+    fn holds(&self, node: usize, closed: &[usize]) -> bool {
+        if !self.net.crowded(node) {
+            return true;
+        }
+        let mut without = Self {
+            net: self.net,
+            price: Vec::new(),
+            cut: self.cut.clone(),
+        };
+        closed.iter().for_each(|&side| without.set(side, false));
+        without
+            .sectors(node)
+            .iter()
+            .all(|s| s.len() <= MOST_IN_SECTOR)
+    }
+
+    /// Sides on which the seam may leave a node: at a crowded vertex those that leave no sector too large.
+    fn exits(&self, node: usize) -> Vec<usize> {
+        if !self.net.crowded(node) {
+            let leaving = self.net.leaving[node].iter();
+            return leaving.copied().filter(|&side| !self.cut[side]).collect();
+        }
+        self.sectors(node)
+            .iter()
+            .flat_map(|s| self.halving(s))
+            .collect()
+    }
+
+    /// The sides of a sector that divide it well.
+    fn halving<'s>(&self, sector: &'s [usize]) -> impl Iterator<Item = usize> + use<'s> {
+        let count = sector.len();
+        let bordered = self.cut[sector[0]];
+        let fair = move |k: usize| {
+            let larger = k.max(count - k);
+            count <= MOST_IN_SECTOR || larger <= MOST_IN_SECTOR.max(count - MOST_IN_SECTOR)
+        };
+        (0..count)
+            .filter(move |&k| !bordered || (k > 0 && fair(k)))
+            .map(|k| sector[k])
+    }
+
+    /// Cheapest ways over sides that are not cut, starting with the sides given. `reach` hears of every side in the
+    /// order of its price, and says how to go on from its head. Returns the side before each; see [`path`].
+    fn explore(
+        &self,
+        starts: impl Iterator<Item = usize>,
+        mut reach: impl FnMut(u64, usize) -> Onward,
+    ) -> Vec<usize> {
+        let net = self.net;
+        let mut best = vec![u64::MAX; net.twin.len()];
+        let mut before = vec![usize::MAX; net.twin.len()];
+        let mut left_rim = vec![false; net.rim.len()];
+        let mut queue = BinaryHeap::new();
+        for side in starts {
+            best[side] = self.price[side];
+            queue.push(Reverse((best[side], side)));
+        }
+        while let Some(Reverse((so_far, here))) = queue.pop() {
+            if so_far > best[here] {
+                continue;
+            }
+            match reach(so_far, here) {
+                Onward::Pass => {}
+                Onward::Stay => continue,
+                Onward::Done => break,
+            }
+            let mut go = |side: usize, turn: u64| {
+                let total = so_far + self.price[side] + turn;
+                if !self.cut[side] && total < best[side] {
+                    best[side] = total;
+                    before[side] = here;
+                    queue.push(Reverse((total, side)));
+                }
+            };
+            let head = net.head(here);
+            if net.rim[head] {
+                // Once is enough: nobody leaves a rim for less than the first who came.
+                if !std::mem::replace(&mut left_rim[head], true) {
+                    net.leaving[head].iter().for_each(|&side| go(side, 0));
+                }
+                continue;
+            }
+            // Clockwise around the head, from the sharpest left; half of its triangles on the left is straight on.
+            let count = net.leaving[head].len();
+            let mut side = next(here);
+            for corners in 1..count {
+                let turn = (2 * corners).abs_diff(count) as u64;
+                go(side, TURN_PRICE * turn * turn / 4);
+                let Some(twin) = net.twin[side] else { break };
+                side = next(twin);
+            }
+        }
+        before
+    }
+
+    /// Leads the seam out of a vertex through a sector that is too large, to where it costs least, what can be closed
+    /// again deducted, and preferably so that the sheet stays in one piece. False if there is no way.
+    fn second_way(&mut self, sector: &[usize]) -> bool {
+        let net = self.net;
+        let rim = self.rim_from(sector[0]);
+        // Where on the sheet's rim a corner lies, and each side.
+        let mut place = vec![usize::MAX; net.twin.len()];
+        let mut at = vec![usize::MAX; net.twin.len()];
+        for (k, &side) in rim.iter().enumerate() {
+            at[side] = k;
+            let mut corner = next(side);
+            place[corner] = k;
+            while let (false, Some(twin)) = (self.cut[corner], net.twin[corner]) {
+                corner = next(twin);
+                place[corner] = k;
+            }
+        }
+        let joined: Vec<bool> = (0..net.flat.len())
+            .map(|n| net.rim[n] || net.leaving[n].iter().any(|&side| self.cut[side]))
+            .collect();
+        let mut best: Option<((bool, i64, usize), Vec<usize>)> = None;
+        let before = self.explore(self.halving(sector), |price, side| {
+            if !joined[net.head(side)] {
+                return Onward::Pass;
+            }
+            // A rim of its own is not on the sheet's outer one: to reach it splits nothing.
+            let end = place[next(side)];
+            let spare = if end == usize::MAX {
+                Vec::new()
+            } else {
+                self.spare(&rim, &at, end)
+            };
+            let gain: u64 = spare.iter().map(|&s| self.price[s]).sum();
+            let rank = (
+                end != usize::MAX && spare.is_empty(),
+                price as i64 - gain as i64,
+                side,
+            );
+            if best.as_ref().is_none_or(|(least, _)| rank < *least) {
+                best = Some((rank, spare));
+            }
+            Onward::Stay
+        });
+        let Some(((_, _, last), spare)) = best else {
+            return false;
+        };
+        spare.into_iter().for_each(|side| self.set(side, false));
+        path(&before, last)
+            .into_iter()
+            .for_each(|side| self.set(side, true));
+        true
+    }
+
+    /// The rim of the cut-open sheet from a side on it, around to itself.
+    fn rim_from(&self, first: usize) -> Vec<usize> {
+        let mut rim = vec![first];
+        loop {
+            let mut side = next(rim[rim.len() - 1]);
+            while let (false, Some(twin)) = (self.cut[side], self.net.twin[side]) {
+                side = next(twin);
+            }
+            if side == first {
+                return rim;
+            }
+            rim.push(side);
+        }
+    }
+
+    /// The dearest part of the seam that may be closed once a way leads from the start of the sheet's `rim` to the end
+    /// of its side `end`: its two sides then belong to two pieces, which it joins again.
+    fn spare(&self, rim: &[usize], at: &[usize], end: usize) -> Vec<usize> {
+        let net = self.net;
+        let parting = |side: usize| {
+            net.twin[side].is_some_and(|twin| at[twin] != usize::MAX && at[twin] > end)
+        };
+        let through = |node: usize| {
+            net.flat[node]
+                && !net.rim[node]
+                && net.leaving[node]
+                    .iter()
+                    .filter(|&&side| self.cut[side])
+                    .count()
+                    == 2
+        };
+        let own = net.node[rim[0]];
+        rim[..=end]
+            .chunk_by(|&a, &b| parting(a) == parting(b) && through(net.head(a)))
+            .filter(|run| parting(run[0]))
+            .filter(|run| {
+                let ends = [net.node[run[0]], net.head(run[run.len() - 1])];
+                ends.iter()
+                    .all(|&node| node != own && self.holds(node, run))
+            })
+            .max_by_key(|run| run.iter().map(|&side| self.price[side]).sum::<u64>())
+            .map(<[usize]>::to_vec)
+            .unwrap_or_default()
+    }
+}
+
+/// The sides that lead to `last`, in order.
+fn path(before: &[usize], last: usize) -> Vec<usize> {
+    let mut sides: Vec<usize> = std::iter::successors(Some(last), |&side| {
+        before.get(before[side]).map(|_| before[side])
+    })
+    .collect();
+    sides.reverse();
+    sides
+}
+
+/// Disjoint sets.
+struct Groups(Vec<usize>);
+
+impl Groups {
+    fn new(count: usize) -> Self {
+        Self((0..count).collect())
+    }
+
+    fn root(&mut self, mut n: usize) -> usize {
+        while self.0[n] != n {
+            self.0[n] = self.0[self.0[n]];
+            n = self.0[n];
+        }
+        n
+    }
+
+    /// Joins two sets; false if they were one already.
+    fn join(&mut self, a: usize, b: usize) -> bool {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b)] = a.min(b);
+        a != b
+    }
 }
