@@ -83,6 +83,10 @@ pub struct Layout {
 /// pattern could follow.
 const TURN_TOLERANCE: f64 = 1e-6;
 
+/// How much worse it is to ask the sheet to shrink than to stretch too far. Triangles can bridge a dent or a small tip
+/// that they cannot follow; where the sheet is too large they run into each other.
+const PRICE_BELOW: f64 = 5.0;
+
 /// The range of λ over a layout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScaleSummary {
@@ -251,8 +255,8 @@ impl Layout {
         summary
     }
 
-    /// Where λ, in a window as wide as σ allows, covers most of the surface (the cones' neighbourhoods left out): the
-    /// smallest λ of the best window [λ, σ λ].
+    /// The smallest λ of the window [λ, σ λ] that leaves least of the surface outside, the cones' neighbourhoods left
+    /// out and what is below it counted [`PRICE_BELOW`] times.
     pub fn best_window(&self, surface: &Surface, exclude_mm: f64, sigma: f64) -> f64 {
         let mut parts: Vec<(f64, f64)> = surface
             .faces()
@@ -264,16 +268,18 @@ impl Layout {
             })
             .collect();
         parts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (mut best, mut covered, mut end) = ((0.0, 0.0), 0.0, 0);
-        for (low, area) in &parts {
+        let mut best = (f64::INFINITY, 0.0);
+        let (mut below, mut above, mut end) = (0.0, parts.iter().map(|p| p.1).sum::<f64>(), 0);
+        for &(low, area) in &parts {
             while end < parts.len() && parts[end].0 <= low + sigma.ln() {
-                covered += parts[end].1;
+                above -= parts[end].1;
                 end += 1;
             }
-            if covered > best.0 {
-                best = (covered, *low);
+            let price = above + PRICE_BELOW * below;
+            if price < best.0 {
+                best = (price, low);
             }
-            covered -= area;
+            below += area;
         }
         best.1.exp()
     }

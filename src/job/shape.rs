@@ -156,10 +156,10 @@ fn maps(
             maps
         }
     };
-    // A map within σ comes first, the one that removes least of those; else the one that leaves least of the surface
-    // outside. The sort is stable.
+    // A map within [1, σ] comes first, the one that removes least of those; else the one that leaves least of the
+    // surface outside. The sort is stable.
     let outside = |map: &Map| {
-        if map.flat.scale.max <= sigma {
+        if map.flat.scale.max <= map.flat.scale.min * sigma {
             0.0
         } else {
             1.0 - map.flat.scale.inside

@@ -66,9 +66,15 @@ pub(crate) fn warnings(
             }
         ));
     }
+    if built.pieces > 1 {
+        warnings.push(format!(
+            "the sheet is cut in {} pieces, because around a cone of negative curvature there is more than lies flat: join them along their seams",
+            built.pieces
+        ));
+    }
     if built.seam_edges > 0 {
         warnings.push(format!(
-            "the sheet has a seam of {} triangle edges from the cone to the rim: its two sides must be joined by hand, edge to edge",
+            "the sheet has seams of {} triangle edges in all: their two sides must be joined by hand, edge to edge",
             built.seam_edges
         ));
     }
@@ -219,6 +225,7 @@ pub(crate) fn figures(
             "removed_at_cone": built.removed,
             "left_out_at_rim": built.lost,
             "seam_edges": built.seam_edges,
+            "pieces": built.pieces,
             "overlaps_on_sheet": built.overlaps.len(),
         },
         "solve": { "steps": shape.effort.steps, "factorizations": shape.effort.factorizations },

@@ -123,7 +123,7 @@ impl Verdict {
             say(
                 None,
                 format!(
-                    "{flat_overlaps} pairs of triangles lie on one another on the flat sheet: it cannot be cut from one piece. Place the cone elsewhere (--cone X,Y,Z); a cone of negative curvature needs a cut through it, which is not supported yet"
+                    "{flat_overlaps} pairs of triangles lie on one another on the flat sheet, and dividing it did not help: place the cones elsewhere (--cone X,Y,Z)"
                 ),
             );
         }
