@@ -26,8 +26,8 @@ const ANGLE_TOLERANCE: f64 = 1e-12;
 /// layout's seams close to this accuracy.
 const ANGLE_ACCEPTED: f64 = 1e-8;
 
-/// Newton steps before giving up. Good meshes take 2–7, meshes with broken triangles up to about 30.
-const MAX_STEPS: usize = 60;
+/// Newton steps before giving up. Good meshes take 2–7, meshes with broken triangles up to some dozens.
+const MAX_STEPS: usize = 200;
 
 /// The result of a solve.
 #[derive(Clone, Debug)]
@@ -269,9 +269,15 @@ impl<'a> MetricSolver<'a> {
                 let trial_slope: f64 = trial_gradient.iter().zip(&step).map(|(g, s)| g * s).sum();
                 let rest = norm(&trial_gradient);
                 if rest.is_finite() && (trial_slope <= -0.1 * slope || rest < 0.5 * residual) {
-                    break rest < residual || trial_slope <= 0.1 * slope;
+                    break true;
                 }
-                length *= 0.5;
+                // Where a straight line between the two slopes crosses zero.
+                let crossing = slope / (slope - trial_slope);
+                length *= if crossing.is_finite() {
+                    crossing.clamp(0.1, 0.5)
+                } else {
+                    0.1
+                };
                 if length < 1e-10 {
                     break false;
                 }

@@ -76,15 +76,20 @@ pub(crate) fn shape(
     progress: &dyn Progress,
 ) -> Result<Shape, MakeError> {
     let mut best: Option<Shape> = None;
+    let mut refused: Option<MakeError> = None;
     for map in maps(request, loaded, stock.sigma, progress)? {
-        let shape = attempt(
-            request,
-            &loaded.import.surface,
-            map,
-            stock,
-            closest,
-            progress,
-        )?;
+        let surface = &loaded.import.surface;
+        let shape = match attempt(request, surface, map, stock, closest, progress) {
+            Ok(shape) => shape,
+            // A map may ask for triangles that are too small for the hinges, or for too many, where another does not.
+            Err(error @ (MakeError::Pattern(_) | MakeError::Linkage(_)))
+                if progress.check().is_ok() =>
+            {
+                refused = refused.or(Some(error));
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
         if shape.verdict.pass {
             return Ok(shape);
         }
@@ -94,7 +99,7 @@ pub(crate) fn shape(
             best = Some(shape);
         }
     }
-    best.ok_or_else(|| MakeError::Internal("no layout was tried".into()))
+    best.ok_or_else(|| refused.unwrap_or_else(|| MakeError::Internal("no layout was tried".into())))
 }
 
 /// A map with the options that made it and the number of triangles to remove.
