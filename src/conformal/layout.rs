@@ -332,7 +332,7 @@ impl Layout {
         self.spread_transitions(surface);
     }
 
-    pub(crate) fn vertex_position(&self, surface: &Surface, vertex: VertexId) -> Point2<f64> {
+    fn vertex_position(&self, surface: &Surface, vertex: VertexId) -> Point2<f64> {
         surface
             .around(vertex)
             .next()

@@ -308,11 +308,7 @@ impl<'a> MetricSolver<'a> {
                 position: self.surface.position(vertex).into(),
             });
         }
-        let u: Per<VertexId, f64> = self
-            .row
-            .iter()
-            .map(|&r| if r == NONE { 0.0 } else { u[r as usize] })
-            .collect();
+        let u = spread(&self.row, &u);
         let mut metric = Metric {
             u,
             steps,
@@ -368,6 +364,88 @@ impl<'a> MetricSolver<'a> {
                 other => return Ok(other?),
             }
         }
+    }
+}
+
+/// The first Newton step from the surface's own metric, for all singularities at once: u is linear in them.
+pub(super) struct LinearModel<'s> {
+    surface: &'s Surface,
+    row: &'s Per<VertexId, u32>,
+    cholesky: &'s mut Cholesky,
+    start: Per<VertexId, f64>,
+    rhs: Vec<f64>,
+}
+
+impl MetricSolver<'_> {
+    /// The linear model: one factorisation of the surface's cotangent Laplacian.
+    pub(super) fn linear_model(&mut self) -> Result<LinearModel<'_>, ConformalError> {
+        let none = Singularities {
+            cones: Vec::new(),
+            turnings: vec![0; self.surface.rims().len().saturating_sub(1)],
+        };
+        let target = self.targets(&none);
+        let mut gradient = vec![0.0; self.rows];
+        let mut hessian = vec![0.0; self.cholesky.pattern().entries()];
+        self.evaluate(&vec![0.0; self.rows], &target, &mut gradient, &mut hessian);
+        self.factor(&mut hessian)?;
+        gradient.iter_mut().for_each(|g| *g = -*g);
+        self.cholesky.solve(&mut gradient);
+        Ok(LinearModel {
+            surface: self.surface,
+            row: &self.row,
+            start: spread(&self.row, &gradient),
+            cholesky: &mut self.cholesky,
+            rhs: gradient,
+        })
+    }
+}
+
+/// The value of every vertex' unknown; 0 where it has none.
+fn spread(row: &Per<VertexId, u32>, values: &[f64]) -> Per<VertexId, f64> {
+    row.iter()
+        .map(|&r| if r == NONE { 0.0 } else { values[r as usize] })
+        .collect()
+}
+
+impl LinearModel<'_> {
+    /// u without cones, all inner rims turning by 0.
+    pub fn start(&self) -> &Per<VertexId, f64> {
+        &self.start
+    }
+
+    /// What a cone of +1 at a vertex adds.
+    pub fn cone(&mut self, vertex: VertexId) -> Per<VertexId, f64> {
+        let row = self.row[vertex];
+        self.column(|rhs| {
+            if row != NONE {
+                rhs[row as usize] = CURVATURE_UNIT;
+            }
+        })
+    }
+
+    /// What one more unit of turning at inner rim `rim` (1, 2, …) adds.
+    pub fn rim(&mut self, rim: usize) -> Per<VertexId, f64> {
+        self.cone(self.surface.rims()[rim][0])
+    }
+
+    /// What one unit of curvature adds that is spread in proportion to `weight`.
+    pub fn spread(&mut self, weight: &Per<VertexId, f64>) -> Per<VertexId, f64> {
+        let total: f64 = weight.iter().sum();
+        let row = self.row;
+        self.column(|rhs| {
+            for (w, &r) in weight.iter().zip(row.iter()) {
+                if r != NONE {
+                    rhs[r as usize] += CURVATURE_UNIT * w / total;
+                }
+            }
+        })
+    }
+
+    fn column(&mut self, fill: impl FnOnce(&mut [f64])) -> Per<VertexId, f64> {
+        self.rhs.fill(0.0);
+        fill(&mut self.rhs);
+        self.cholesky.solve(&mut self.rhs);
+        spread(self.row, &self.rhs)
     }
 }
 

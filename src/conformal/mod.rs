@@ -12,6 +12,7 @@ mod distance;
 mod layout;
 mod metric;
 mod propose;
+mod search;
 
 pub use cone::{CURVATURE_UNIT, Cone, Singularities};
 pub use cut::{Segment, cut_graph};
@@ -20,6 +21,7 @@ pub use metric::{Metric, MetricSolver};
 pub use propose::{
     ConeRequest, FlattenOptions, Flattened, Sizing, choose_turnings, flatten, vertex_from_number,
 };
+pub use search::{SearchOptions, search};
 
 use crate::base::progress::Interrupted;
 use crate::base::sparse::FactorError;

@@ -33,7 +33,7 @@ pub enum ConePlace {
 /// Which cones are wanted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum ConeWish {
-    /// As many as needed (so far: none or one).
+    /// As many as needed.
     #[default]
     Auto,
     /// Exactly these, with their curvature in units of 2π/3.

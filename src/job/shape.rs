@@ -12,8 +12,8 @@ use super::verdict::{Verdict, place};
 use crate::base::progress::Progress;
 use crate::base::units::short;
 use crate::conformal::{
-    Cone, ConeRequest, FlattenOptions, Flattened, MetricSolver, Singularities, Sizing,
-    choose_turnings,
+    Cone, ConeRequest, ConformalError, FlattenOptions, Flattened, MetricSolver, SearchOptions,
+    Singularities, Sizing, choose_turnings, search,
 };
 use crate::linkage::{Built, Linkage, LinkageOptions, build, fit};
 use crate::machine::Machine;
@@ -67,6 +67,11 @@ pub(crate) struct Shape {
 /// next ring. λ falls to 0 at such a cone, and the finer the triangles, the deeper they reach into the fall.
 const REMOVALS: [usize; 2] = [4, 16];
 
+/// Sets of singularities that the search proposes and that are mapped.
+const MAPPED: usize = 6;
+/// Maps on which a linkage is tried, until one passes.
+const TRIED: usize = 4;
+
 /// Finds the shape: the first number of removed triangles that passes, else the one that comes closest.
 pub(crate) fn shape(
     request: &Request,
@@ -119,20 +124,29 @@ fn maps(
 ) -> Result<Vec<Map>, MakeError> {
     let surface = &loaded.import.surface;
     let mut solver = MetricSolver::new(surface).map_err(MakeError::Conformal)?;
-    let mut solve = |cones: &[Cone]| -> Result<Vec<Map>, MakeError> {
+    let options = |removal: usize| FlattenOptions {
+        sigma,
+        cones: ConeRequest::Auto,
+        sizing: request.sizing,
+        cone_clearance: clearance(removal),
+    };
+    let removals = |cones: &[Cone]| match request.remove_at_cone {
+        _ if cones.iter().all(|c| c.units <= 0) => vec![0],
+        Some(count) => vec![count],
+        None => REMOVALS.to_vec(),
+    };
+    let resized = |flat: Flattened| -> Vec<Map> {
+        let map = |removal: usize| Map {
+            flat: flat.clone().resize(surface, &options(removal)),
+            options: options(removal),
+            removal,
+        };
+        removals(&flat.layout.cones).into_iter().map(map).collect()
+    };
+    // With the turnings of the rims as asked for, or those that suit these cones best.
+    let mut with_cones = |cones: &[Cone]| -> Result<Vec<Map>, ConformalError> {
         progress.start("conformal map", None);
-        let options = |removal: usize| FlattenOptions {
-            sigma,
-            cones: ConeRequest::Auto,
-            sizing: request.sizing,
-            cone_clearance: clearance(removal),
-        };
-        let removals = match request.remove_at_cone {
-            _ if cones.iter().all(|c| c.units <= 0) => vec![0],
-            Some(count) => vec![count],
-            None => REMOVALS.to_vec(),
-        };
-        let first = options(removals[0]);
+        let first = options(removals(cones)[0]);
         let flat = match &request.turnings {
             Some(turnings) => {
                 let given = Singularities {
@@ -142,21 +156,43 @@ fn maps(
                 Flattened::solve(&mut solver, &given, &first, progress)
             }
             None => choose_turnings(&mut solver, cones, &first, progress),
-        }
-        .map_err(MakeError::Conformal)?;
-        let resized = removals.into_iter().map(|removal| Map {
-            flat: flat.clone().resize(surface, &options(removal)),
-            options: options(removal),
-            removal,
-        });
-        Ok(resized.collect())
+        };
+        flat.map(resized)
     };
     let mut maps = match &loaded.cones {
-        Some(cones) => solve(cones)?,
+        Some(cones) => with_cones(cones).map_err(MakeError::Conformal)?,
         None => {
-            let mut maps = solve(&[])?;
-            if let Some(cone) = maps[0].flat.proposed_cone(surface, sigma) {
-                maps.extend(solve(&[cone])?);
+            let mut maps = match with_cones(&[]) {
+                // A closed surface may need cones.
+                Err(ConformalError::TotalCurvature { .. }) => Vec::new(),
+                plain => plain.map_err(MakeError::Conformal)?,
+            };
+            if maps
+                .first()
+                .is_some_and(|m| m.flat.scale.max <= m.flat.scale.min * sigma)
+            {
+                return Ok(maps);
+            }
+            progress.start("searching for cones", None);
+            let edge_mm = match request.sizing {
+                Sizing::EdgeMm(edge) => edge,
+                // Half of a surface is about as much as its sheet.
+                Sizing::Triangles(count) => (surface.area() / (2.0 * count * 0.433)).sqrt(),
+            };
+            let wish = SearchOptions { sigma, edge_mm };
+            let sets = search(&mut solver, &wish, progress).map_err(MakeError::Conformal)?;
+            for set in sets
+                .into_iter()
+                .filter(|s| !s.cones.is_empty())
+                .take(MAPPED)
+            {
+                let first = options(removals(&set.cones)[0]);
+                match Flattened::solve(&mut solver, &set, &first, progress) {
+                    Ok(flat) => maps.extend(resized(flat)),
+                    // Cones on a surface with handles rarely close around them.
+                    Err(ConformalError::Holonomy { .. } | ConformalError::NotConverged { .. }) => {}
+                    Err(error) => return Err(MakeError::Conformal(error)),
+                }
             }
             maps
         }
@@ -171,6 +207,7 @@ fn maps(
         }
     };
     maps.sort_by(|a, b| outside(a).total_cmp(&outside(b)));
+    maps.truncate(TRIED);
     Ok(maps)
 }
 

@@ -10,6 +10,7 @@ use super::net::Net;
 use super::walk::Walker;
 use super::{Colour, LinkageError};
 use crate::base::progress::Progress;
+use crate::base::union::Union;
 use crate::conformal::Layout;
 use crate::mesh::{FaceId, HalfedgeId, Surface};
 
@@ -146,14 +147,7 @@ fn merge(
     entries: &[(FaceId, Key)],
     index: &HashMap<(FaceId, Key), usize>,
 ) -> Vec<usize> {
-    let mut parent: Vec<usize> = (0..entries.len()).collect();
-    fn root(parent: &mut [usize], mut n: usize) -> usize {
-        while parent[n] != n {
-            parent[n] = parent[parent[n]];
-            n = parent[n];
-        }
-        n
-    }
+    let mut same = Union::new(entries.len());
     for (n, &(face, key)) in entries.iter().enumerate() {
         let point = lattice.centroid(key);
         for (side, depth) in walker.depths(face, point).into_iter().enumerate() {
@@ -163,13 +157,12 @@ fn merge(
             if let Some((twin, motion)) = walker.cross(HalfedgeId::side(face, side)) {
                 let theirs = (twin.face(), lattice.key_at_centroid(motion.apply(point)));
                 if let Some(&other) = index.get(&theirs) {
-                    let (a, b) = (root(&mut parent, n), root(&mut parent, other));
-                    parent[a.max(b)] = a.min(b);
+                    same.join(n, other);
                 }
             }
         }
     }
-    (0..entries.len()).map(|n| root(&mut parent, n)).collect()
+    (0..entries.len()).map(|n| same.root(n)).collect()
 }
 
 /// The entry of the triangle across a side, reached on foot: straight from centroid to centroid, or around by one of

@@ -13,6 +13,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::net::{Net, next};
+use crate::base::union::Union;
 
 /// Price of a turn by 60° at a vertex of the seam, in edges. A seam with fewer corners is easier to close by hand;
 /// half an edge still prefers a way that is one edge shorter to one with two corners fewer.
@@ -149,7 +150,7 @@ impl<'a> Seam<'a> {
             })
             .collect();
         free.sort_unstable();
-        let mut trees = Groups::new(net.twin.len() / 3);
+        let mut trees = Union::new(net.twin.len() / 3);
         for (_, side, twin) in free {
             if trees.join(side / 3, twin / 3) {
                 continue;
@@ -394,28 +395,4 @@ fn path(before: &[usize], last: usize) -> Vec<usize> {
     .collect();
     sides.reverse();
     sides
-}
-
-/// Disjoint sets.
-struct Groups(Vec<usize>);
-
-impl Groups {
-    fn new(count: usize) -> Self {
-        Self((0..count).collect())
-    }
-
-    fn root(&mut self, mut n: usize) -> usize {
-        while self.0[n] != n {
-            self.0[n] = self.0[self.0[n]];
-            n = self.0[n];
-        }
-        n
-    }
-
-    /// Joins two sets; false if they were one already.
-    fn join(&mut self, a: usize, b: usize) -> bool {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b)] = a.min(b);
-        a != b
-    }
 }

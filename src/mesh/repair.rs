@@ -15,6 +15,7 @@ use super::read::{Format, Soup, read_bytes, read_file};
 use super::surface::{Surface, TopologyError};
 use super::units::Units;
 use crate::base::ids::Id as _;
+use crate::base::union::Union;
 
 /// Which part of a surface in several parts is wanted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -344,27 +345,16 @@ fn choose_part(
     report: &mut ImportReport,
 ) -> Result<(), Problem> {
     let edges = edges(faces);
-    let mut parent: Vec<usize> = (0..faces.len()).collect();
-    fn root(parent: &mut [usize], mut i: usize) -> usize {
-        while parent[i] != i {
-            parent[i] = parent[parent[i]];
-            i = parent[i];
-        }
-        i
-    }
+    // A set is named by its lowest face, so that ties are settled by the order of the file.
+    let mut part = Union::new(faces.len());
     for group in edges.chunk_by(same_edge) {
         for pair in group.windows(2) {
-            let (a, b) = (
-                root(&mut parent, pair[0].2 / 3),
-                root(&mut parent, pair[1].2 / 3),
-            );
-            // The lowest face is the root, so that ties are settled by the order of the file.
-            parent[a.max(b)] = a.min(b);
+            part.join(pair[0].2 / 3, pair[1].2 / 3);
         }
     }
     let mut size = vec![0usize; faces.len()];
     for i in 0..faces.len() {
-        size[root(&mut parent, i)] += 1;
+        size[part.root(i)] += 1;
     }
     let mut parts: Vec<(usize, usize)> = size
         .iter()
@@ -395,7 +385,7 @@ fn choose_part(
     let mut at = 0;
     faces.retain(|_| {
         at += 1;
-        root(&mut parent, at - 1) == kept
+        part.root(at - 1) == kept
     });
     report.other_part_faces = before - faces.len();
     Ok(())
