@@ -256,7 +256,7 @@ impl Layout {
     }
 
     /// The smallest λ of the window [λ, σ λ] that leaves least of the surface outside, the cones' neighbourhoods left
-    /// out and what is below it counted [`PRICE_BELOW`] times.
+    /// out, and what is below it counted five times: to shrink is harder for a sheet than to bridge a dent.
     pub fn best_window(&self, surface: &Surface, exclude_mm: f64, sigma: f64) -> f64 {
         let mut parts: Vec<(f64, f64)> = surface
             .faces()
