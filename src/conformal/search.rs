@@ -39,11 +39,11 @@ const CANDIDATES: usize = 240;
 const SAMPLES: usize = 4000;
 /// Cones at the most, beyond those that a closed surface must have.
 const MOST_CONES: usize = 12;
-/// Toll of one cone of +1: worth it if it removes a squared excess of ln λ of this much, averaged over the area (one
-/// percent of the surface off by a factor of e^0.3).
-const TOLL: f64 = 1e-3;
+/// Toll of one cone of +1: worth it if it removes a squared excess of ln λ of this much, averaged over the area (a third
+/// of a percent of the surface off by a factor of e^0.3).
+const TOLL: f64 = 3e-4;
 /// A negative cone costs more: the sheet must be cut through it.
-const TOLL_NEGATIVE: f64 = 2e-3;
+const TOLL_NEGATIVE: f64 = 6e-4;
 /// Around a cone λ is not looked at, in triangle edges on the surface.
 const CLEARANCE: f64 = 2.0;
 /// Cones closer than this to each other or to a rim, in triangle edges, are not proposed.

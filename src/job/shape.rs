@@ -173,6 +173,13 @@ fn maps(
             {
                 return Ok(maps);
             }
+            // The obvious cone; the search may find a better one, or that none is worth its price.
+            let obvious = maps
+                .first()
+                .and_then(|m| m.flat.proposed_cone(surface, sigma));
+            if let Some(cone) = obvious {
+                maps.extend(with_cones(&[cone]).map_err(MakeError::Conformal)?);
+            }
             progress.start("searching for cones", None);
             let edge_mm = match request.sizing {
                 Sizing::EdgeMm(edge) => edge,
