@@ -188,11 +188,9 @@ fn maps(
             };
             let wish = SearchOptions { sigma, edge_mm };
             let sets = search(&mut solver, &wish, progress).map_err(MakeError::Conformal)?;
-            for set in sets
-                .into_iter()
-                .filter(|s| !s.cones.is_empty())
-                .take(MAPPED)
-            {
+            let known: Vec<Singularities> =
+                maps.iter().map(|m| m.flat.singularities.clone()).collect();
+            for set in sets.into_iter().filter(|s| !known.contains(s)).take(MAPPED) {
                 let first = options(removals(&set.cones)[0]);
                 match Flattened::solve(&mut solver, &set, &first, progress) {
                     Ok(flat) => maps.extend(resized(flat)),
