@@ -85,7 +85,7 @@ const TURN_TOLERANCE: f64 = 1e-6;
 
 /// How much worse it is to ask the sheet to shrink than to stretch too far. Triangles can bridge a dent or a small tip
 /// that they cannot follow; where the sheet is too large they run into each other.
-const PRICE_BELOW: f64 = 5.0;
+const PRICE_BELOW: f64 = 25.0;
 
 /// The range of λ over a layout.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -256,7 +256,7 @@ impl Layout {
     }
 
     /// The smallest λ of the window [λ, σ λ] that leaves least of the surface outside, the cones' neighbourhoods left
-    /// out, and what is below it counted five times: to shrink is harder for a sheet than to bridge a dent.
+    /// out, and what is below it counted many times: to shrink is harder for a sheet than to bridge a dent.
     pub fn best_window(&self, surface: &Surface, exclude_mm: f64, sigma: f64) -> f64 {
         let mut parts: Vec<(f64, f64)> = surface
             .faces()
