@@ -162,9 +162,13 @@ fn maps(
     let mut maps = match &loaded.cones {
         Some(cones) => with_cones(cones).map_err(MakeError::Conformal)?,
         None => {
+            let mut refused = None;
             let mut maps = match with_cones(&[]) {
                 // A closed surface may need cones.
-                Err(ConformalError::TotalCurvature { .. }) => Vec::new(),
+                Err(error @ ConformalError::TotalCurvature { .. }) => {
+                    refused = Some(error);
+                    Vec::new()
+                }
                 plain => plain.map_err(MakeError::Conformal)?,
             };
             if maps
@@ -195,9 +199,15 @@ fn maps(
                 match Flattened::solve(&mut solver, &set, &first, progress) {
                     Ok(flat) => maps.extend(resized(flat)),
                     // Cones on a surface with handles rarely close around them.
-                    Err(ConformalError::Holonomy { .. } | ConformalError::NotConverged { .. }) => {}
+                    Err(
+                        error @ (ConformalError::Holonomy { .. }
+                        | ConformalError::NotConverged { .. }),
+                    ) => refused = Some(error),
                     Err(error) => return Err(MakeError::Conformal(error)),
                 }
+            }
+            if let Some(error) = refused.filter(|_| maps.is_empty()) {
+                return Err(MakeError::Conformal(error));
             }
             maps
         }
