@@ -60,7 +60,6 @@ fn surface(case: usize) -> Surface {
 fn options(case: usize, triangles: f64) -> FlattenOptions {
     FlattenOptions {
         sigma: SIGMA,
-        cones: ConeRequest::Auto,
         sizing: Sizing::Triangles(triangles),
         cone_clearance: if CASES[case].1 > 0 { 1.1 } else { 0.7 },
     }
@@ -85,7 +84,13 @@ struct Laid {
 
 fn laid(case: usize, triangles: f64) -> Laid {
     let surface = surface(case);
-    let flat = flatten(&surface, &options(case, triangles), &Silent).expect("a map");
+    let flat = flatten(
+        &surface,
+        &ConeRequest::Auto,
+        &options(case, triangles),
+        &Silent,
+    )
+    .expect("a map");
     let built = build(&surface, &flat.layout, &lattice(case, &flat), &Silent).expect("a linkage");
     let closest = ClosestPoint::new(&surface);
     Laid {
@@ -125,7 +130,10 @@ fn conformal_metric_without_cone(bencher: Bencher<'_, '_>, case: usize) {
 #[divan::bench(args = cases(), sample_count = 10)]
 fn flatten_with_automatic_cone(bencher: Bencher<'_, '_>, case: usize) {
     let surface = surface(case);
-    bencher.bench_local(|| flatten(&surface, &options(case, 1500.0), &Silent).map(|f| f.edge_mm));
+    let options = options(case, 1500.0);
+    bencher.bench_local(|| {
+        flatten(&surface, &ConeRequest::Auto, &options, &Silent).map(|f| f.edge_mm)
+    });
 }
 
 #[divan::bench(args = cases(), sample_count = 10)]

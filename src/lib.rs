@@ -56,11 +56,10 @@
 //! // The conformal map; λ of a 60° cap needs 4/3 and no cone.
 //! let options = FlattenOptions {
 //!     sigma,
-//!     cones: ConeRequest::Auto,
 //!     sizing: Sizing::Triangles(150.0),
 //!     cone_clearance: 0.7,
 //! };
-//! let flat = flatten(&surface, &options, &Silent)?;
+//! let flat = flatten(&surface, &ConeRequest::Auto, &options, &Silent)?;
 //! assert!(flat.layout.cones.is_empty());
 //!
 //! // The linkage, flat and closed on the sheet, opened on the surface; then made exact.

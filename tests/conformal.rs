@@ -67,11 +67,10 @@ fn caps_need_the_sigma_of_their_closed_form() {
         let cap = sample(&format!("cap:half_angle_deg={half_angle_deg}"));
         let options = FlattenOptions {
             sigma: 2.0,
-            cones: ConeRequest::Auto,
             sizing: Sizing::Triangles(500.0),
             cone_clearance: 0.7,
         };
-        let flat = flatten(&cap, &options, &Silent).unwrap();
+        let flat = flatten(&cap, &ConeRequest::Auto, &options, &Silent).unwrap();
         assert!(flat.layout.cones.is_empty(), "a cap within σ needs no cone");
         let ratio = flat.scale.max / flat.scale.min;
         assert!((ratio - sigma).abs() < 1e-5, "{half_angle_deg}°: {ratio}");
@@ -96,11 +95,11 @@ fn unfolding_closes_with_and_without_a_cone() {
     ] {
         let options = FlattenOptions {
             sigma: 2.0,
-            cones: ConeRequest::Given(Singularities::cones(&bump, cones.clone())),
             sizing: Sizing::Triangles(1500.0),
             cone_clearance: 1.1,
         };
-        let flat = flatten(&bump, &options, &Silent).unwrap();
+        let given = ConeRequest::Given(Singularities::cones(&bump, cones.clone()));
+        let flat = flatten(&bump, &given, &options, &Silent).unwrap();
         assert!(flat.layout.closure < 1e-9, "{:e}", flat.layout.closure);
         assert!(
             flat.layout
@@ -146,17 +145,15 @@ fn a_fine_mesh_unfolds_as_well_as_a_coarse_one() {
             .unwrap();
         let options = FlattenOptions {
             sigma: 2.0,
-            cones: ConeRequest::Given(Singularities::cones(
-                &mask,
-                vec![Cone {
-                    vertex: tip,
-                    units: 1,
-                }],
-            )),
             sizing: Sizing::Triangles(500.0),
             cone_clearance: 1.1,
         };
-        let layout = flatten(&mask, &options, &Silent).unwrap().layout;
+        let cone = Cone {
+            vertex: tip,
+            units: 1,
+        };
+        let given = ConeRequest::Given(Singularities::cones(&mask, vec![cone]));
+        let layout = flatten(&mask, &given, &options, &Silent).unwrap().layout;
         assert!(layout.closure < 1e-9, "{faces}: {:e}", layout.closure);
         assert!(
             layout.seam_gap_mm < 1e-9,
@@ -265,7 +262,7 @@ fn a_closed_surface_needs_cones_that_sum_to_its_curvature() {
     let sphere = sample("octasphere");
     let corners: Vec<Cone> = (0..6)
         .map(|i| {
-            let axis = [[1.0, 0.0], [-1.0, 0.0]][i % 2][0];
+            let axis = if i % 2 == 0 { 1.0 } else { -1.0 };
             let vertex = sphere
                 .positions()
                 .ids()

@@ -31,11 +31,10 @@ fn case(
     let sigma = 2.0;
     let options = FlattenOptions {
         sigma,
-        cones,
         sizing: Sizing::Triangles(triangles),
         cone_clearance: if remove > 0 { 1.1 } else { 0.7 },
     };
-    let flat = flatten(&surface, &options, &Silent).unwrap();
+    let flat = flatten(&surface, &cones, &options, &Silent).unwrap();
     let options = LinkageOptions {
         edge_mm: flat.edge_mm,
         orientation,

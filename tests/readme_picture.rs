@@ -31,11 +31,10 @@ fn the_mask_looks_as_in_the_readme() {
     let sigma = 1.8;
     let options = FlattenOptions {
         sigma,
-        cones: ConeRequest::Auto,
         sizing: Sizing::Triangles(1500.0),
         cone_clearance: 2.1,
     };
-    let flat = flatten(&surface, &options, &Silent).unwrap();
+    let flat = flatten(&surface, &ConeRequest::Auto, &options, &Silent).unwrap();
     let lattice = LinkageOptions {
         edge_mm: flat.edge_mm,
         orientation: 0.0,

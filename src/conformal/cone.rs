@@ -55,6 +55,22 @@ impl Singularities {
         }
     }
 
+    /// How far every rim but the first turns on the surface itself, to the nearest unit.
+    pub(super) fn natural_turnings(surface: &Surface) -> Vec<i32> {
+        let units = |rim: &Vec<VertexId>| (surface.rim_turning(rim) / CURVATURE_UNIT).round();
+        surface
+            .rims()
+            .iter()
+            .skip(1)
+            .map(|rim| units(rim) as i32)
+            .collect()
+    }
+
+    /// The turnings in degrees, as a person reads them.
+    pub fn rim_turnings_deg(&self) -> Vec<i32> {
+        self.turnings.iter().map(|units| 120 * units).collect()
+    }
+
     /// What Gauss–Bonnet leaves for the first rim, in units of 2π/3; on a closed surface it must be 0.
     pub fn rest(&self, surface: &Surface) -> i64 {
         let given = self

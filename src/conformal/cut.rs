@@ -7,11 +7,12 @@
 //! pattern runs on across it, and the sheet's own seam is cut along lattice lines later.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 
+use super::paths::ShortestPaths;
 use super::{Cone, Transition};
 use crate::base::ids::{Id as _, Per};
-use crate::mesh::{FaceId, HalfedgeId, Surface, VertexId};
+use crate::base::union::Union;
+use crate::mesh::{HalfedgeId, Surface, VertexId};
 
 /// A stretch of the cut without a branch: from a cone, a rim or a branch to the next.
 #[derive(Clone, Debug)]
@@ -24,14 +25,13 @@ pub struct Segment {
 
 /// The edges of the cut graph, one halfedge each, in ascending order.
 pub fn cut_graph(surface: &Surface, cones: &[Cone]) -> Vec<HalfedgeId> {
-    let mut forest = Forest::new(surface);
     let terminals: Vec<Vec<VertexId>> = surface
         .rims()
         .iter()
         .cloned()
         .chain(cones.iter().map(|c| vec![c.vertex]))
         .collect();
-    let mut is_cut = Per::<HalfedgeId, bool>::filled(surface.faces().len() * 3, false);
+    let mut cut: Vec<HalfedgeId> = Vec::new();
     let mut joined = terminals
         .first()
         .cloned()
@@ -44,10 +44,15 @@ pub fn cut_graph(surface: &Surface, cones: &[Cone]) -> Vec<HalfedgeId> {
             .copied()
             .flatten()
             .for_each(|&v| goal[v] = true);
-        let Some(met) = forest.grow(&joined, |v| goal[v]) else {
+        let mut paths = ShortestPaths::new(surface);
+        let Some(met) = paths.extend(&joined, |v| goal[v]) else {
             break;
         };
-        forest.mark(met, &mut is_cut, &mut joined);
+        joined.push(met);
+        for h in paths.back(met) {
+            cut.push(h);
+            joined.push(surface.tail(h));
+        }
         waiting.retain(|terminal| {
             let arrived = terminal.contains(&met);
             if arrived {
@@ -56,108 +61,52 @@ pub fn cut_graph(surface: &Surface, cones: &[Cone]) -> Vec<HalfedgeId> {
             !arrived
         });
     }
-    forest.grow(&joined, |_| false);
-    for h in loops(surface, &forest, &is_cut) {
-        is_cut[h] = true;
-        forest.mark(surface.tail(h), &mut is_cut, &mut joined);
-        forest.mark(surface.head(h), &mut is_cut, &mut joined);
+    if surface.genus() > 0 {
+        let mut paths = ShortestPaths::new(surface);
+        paths.extend(&joined, |_| false);
+        for h in loops(surface, &paths, &on_both_sides(surface, &cut)) {
+            cut.push(h);
+            cut.extend(paths.back(surface.tail(h)));
+            cut.extend(paths.back(surface.head(h)));
+        }
     }
-    surface
-        .edges()
-        .filter(|&h| is_cut[h] || surface.twin(h).is_some_and(|t| is_cut[t]))
-        .collect()
+    let is_cut = on_both_sides(surface, &cut);
+    surface.edges().filter(|&h| is_cut[h]).collect()
 }
 
-/// Shortest edge paths from a set of vertices.
-struct Forest<'a> {
-    surface: &'a Surface,
-    distance: Per<VertexId, f64>,
-    /// The halfedge that arrives at each vertex; none at the roots.
-    arrived: Per<VertexId, Option<HalfedgeId>>,
-}
-
-impl<'a> Forest<'a> {
-    fn new(surface: &'a Surface) -> Self {
-        let count = surface.positions().len();
-        Self {
-            surface,
-            distance: Per::filled(count, f64::INFINITY),
-            arrived: Per::filled(count, None),
+/// Marks edges at both their halfedges.
+pub(super) fn on_both_sides(surface: &Surface, edges: &[HalfedgeId]) -> Per<HalfedgeId, bool> {
+    let mut marked = Per::filled(surface.faces().len() * 3, false);
+    for &h in edges {
+        marked[h] = true;
+        if let Some(twin) = surface.twin(h) {
+            marked[twin] = true;
         }
     }
-
-    /// Grows from `roots` until a goal is met, and returns it.
-    fn grow(&mut self, roots: &[VertexId], goal: impl Fn(VertexId) -> bool) -> Option<VertexId> {
-        self.distance.iter_mut().for_each(|d| *d = f64::INFINITY);
-        self.arrived.iter_mut().for_each(|a| *a = None);
-        // Distances are not negative, so their bit patterns sort as they do.
-        let mut queue = BinaryHeap::new();
-        for &root in roots {
-            self.distance[root] = 0.0;
-            queue.push(Reverse((0u64, root)));
-        }
-        while let Some(Reverse((bits, here))) = queue.pop() {
-            let so_far = f64::from_bits(bits);
-            if so_far > self.distance[here] {
-                continue;
-            }
-            if goal(here) {
-                return Some(here);
-            }
-            // The last edge of a rim vertex has no outgoing halfedge, but rims are joined as a whole.
-            for h in self.surface.around(here) {
-                let (next, length) = (self.surface.head(h), so_far + self.surface.length(h));
-                if length < self.distance[next] {
-                    self.distance[next] = length;
-                    self.arrived[next] = Some(h);
-                    queue.push(Reverse((length.to_bits(), next)));
-                }
-            }
-        }
-        None
-    }
-
-    /// Marks the way from `vertex` back to its root, and adds its vertices to `joined`.
-    fn mark(
-        &self,
-        vertex: VertexId,
-        is_cut: &mut Per<HalfedgeId, bool>,
-        joined: &mut Vec<VertexId>,
-    ) {
-        let mut at = vertex;
-        joined.push(at);
-        while let Some(h) = self.arrived[at] {
-            is_cut[h] = true;
-            at = self.surface.tail(h);
-            joined.push(at);
-        }
-    }
+    marked
 }
 
 /// One edge for each generating loop: those that are left over by the shortest paths and by the dual spanning tree
 /// that crosses the edges with the longest loops first.
 fn loops(
     surface: &Surface,
-    forest: &Forest<'_>,
+    paths: &ShortestPaths<'_>,
     is_cut: &Per<HalfedgeId, bool>,
 ) -> Vec<HalfedgeId> {
-    if surface.genus() == 0 {
-        return Vec::new();
-    }
-    let in_tree = |h: HalfedgeId| forest.arrived[surface.head(h)] == Some(h) || is_cut[h];
+    let in_tree = |h: HalfedgeId| paths.arrived[surface.head(h)] == Some(h) || is_cut[h];
     let mut rest: Vec<(u64, HalfedgeId)> = surface
         .edges()
         .filter_map(|h| Some((h, surface.twin(h)?)))
         .filter(|&(h, twin)| !in_tree(h) && !in_tree(twin))
         .map(|(h, _)| {
-            let around = forest.distance[surface.tail(h)]
+            let around = paths.distance[surface.tail(h)]
                 + surface.length(h)
-                + forest.distance[surface.head(h)];
+                + paths.distance[surface.head(h)];
             (around.to_bits(), h)
         })
         .collect();
     rest.sort_unstable_by_key(|&(bits, h)| (Reverse(bits), h));
-    let mut pieces = crate::base::union::Union::new(surface.faces().len());
+    let mut pieces = Union::new(surface.faces().len());
     rest.into_iter()
         .filter(|&(_, h)| {
             let across = surface.twin(h).map_or(h.face(), HalfedgeId::face);
@@ -170,13 +119,9 @@ fn loops(
 /// The cut graph's segments, in the order of their first edges, with no transition yet. Nodes are cones, rim vertices
 /// and branches.
 pub(super) fn segments(surface: &Surface, cones: &[Cone], edges: &[HalfedgeId]) -> Vec<Segment> {
-    let mut is_cut = Per::<HalfedgeId, bool>::filled(surface.faces().len() * 3, false);
+    let is_cut = on_both_sides(surface, edges);
     let mut degree = Per::<VertexId, u32>::filled(surface.positions().len(), 0);
     for &h in edges {
-        is_cut[h] = true;
-        if let Some(twin) = surface.twin(h) {
-            is_cut[twin] = true;
-        }
         degree[surface.tail(h)] += 1;
         degree[surface.head(h)] += 1;
     }
@@ -186,7 +131,7 @@ pub(super) fn segments(surface: &Surface, cones: &[Cone], edges: &[HalfedgeId]) 
         node[v] |= d > 0 && (d != 2 || surface.on_rim(v));
     }
     let mut found = Vec::new();
-    let mut used = Per::<FaceId, [bool; 3]>::filled(surface.faces().len(), [false; 3]);
+    let mut used = Per::<HalfedgeId, bool>::filled(surface.faces().len() * 3, false);
     let mut starts: Vec<HalfedgeId> = edges
         .iter()
         .flat_map(|&h| [Some(h), surface.twin(h)])
@@ -198,11 +143,11 @@ pub(super) fn segments(surface: &Surface, cones: &[Cone], edges: &[HalfedgeId]) 
     for start in starts {
         let mut halfedges = Vec::new();
         let mut here = start;
-        while !used[here.face()][here.corner()] {
+        while !used[here] {
             halfedges.push(here);
-            used[here.face()][here.corner()] = true;
+            used[here] = true;
             if let Some(twin) = surface.twin(here) {
-                used[twin.face()][twin.corner()] = true;
+                used[twin] = true;
             }
             let head = surface.head(here);
             if node[head] {
@@ -235,7 +180,7 @@ mod tests {
 
     /// Faces reachable from each other without crossing the cut, and the Euler characteristic of what is left.
     fn opened(surface: &Surface, cut: &[HalfedgeId]) -> (usize, i64) {
-        let mut pieces = crate::base::union::Union::new(surface.faces().len());
+        let mut pieces = Union::new(surface.faces().len());
         let mut joins = 0;
         for h in surface.edges() {
             if let Some(twin) = surface.twin(h)

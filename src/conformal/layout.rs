@@ -100,6 +100,18 @@ pub struct ScaleSummary {
     pub inside: f64,
 }
 
+impl ScaleSummary {
+    /// The stretch that the map asks for: largest over smallest λ.
+    pub fn ratio(&self) -> f64 {
+        self.max / self.min
+    }
+
+    /// Whether a sheet that stretches up to `sigma` can follow everywhere, the cones' neighbourhoods left out.
+    pub fn within(&self, sigma: f64) -> bool {
+        self.max <= self.min * sigma
+    }
+}
+
 impl Layout {
     /// Unfolds a metric, cut open along `edges` (see [`super::cut_graph`]), which must leave a disk. λ is normalised so
     /// that the metric's own lengths are millimetres; see [`Layout::rescale`].
@@ -112,13 +124,7 @@ impl Layout {
         cones: &[Cone],
         edges: &[HalfedgeId],
     ) -> Result<Self, ConformalError> {
-        let mut is_cut = Per::<HalfedgeId, bool>::filled(surface.faces().len() * 3, false);
-        for &h in edges {
-            is_cut[h] = true;
-            if let Some(twin) = surface.twin(h) {
-                is_cut[twin] = true;
-            }
-        }
+        let is_cut = cut::on_both_sides(surface, edges);
         let (wedge_of, wedges) = wedges(surface, &is_cut);
         let mut place: Vec<Option<Point2<f64>>> = vec![None; wedges];
         let mut visited = Per::<FaceId, bool>::filled(surface.faces().len(), false);
@@ -221,7 +227,6 @@ impl Layout {
     /// λ's range over the vertices farther than `exclude_mm` (on the flat sheet) from every cone, and the part of the
     /// surface's area, the cones' neighbourhoods left out, where λ lies in [1, `sigma`].
     pub fn scale_summary(&self, surface: &Surface, exclude_mm: f64, sigma: f64) -> ScaleSummary {
-        let far = |v: VertexId| self.cone_distance_mm[v] > exclude_mm;
         let mut summary = ScaleSummary {
             min: f64::INFINITY,
             max: 0.0,
@@ -229,39 +234,45 @@ impl Layout {
             inside: 0.0,
         };
         let mut total = 0.0;
-        for (face, v) in surface.faces().iter_ids() {
-            for k in 0..3 {
-                if !far(v[k]) {
-                    continue;
-                }
-                let scale = self.log_scale[v[k]].exp();
+        for (face, v) in self.far_from_cones(surface, exclude_mm) {
+            for &v in v.iter().filter(|v| self.cone_distance_mm[**v] > exclude_mm) {
+                let scale = self.log_scale[v].exp();
                 summary.min = summary.min.min(scale);
-                if scale > summary.max || (scale == summary.max && v[k] < summary.max_vertex) {
-                    (summary.max, summary.max_vertex) = (scale, v[k]);
+                if scale > summary.max || (scale == summary.max && v < summary.max_vertex) {
+                    (summary.max, summary.max_vertex) = (scale, v);
                 }
             }
-            if v.iter().any(|&v| far(v)) {
-                let (area, scale) = (
-                    surface.face_area(face),
-                    self.scale_at(surface, face, [1.0 / 3.0; 3]),
-                );
-                total += area;
-                if (1.0 - 1e-9..=sigma + 1e-9).contains(&scale) {
-                    summary.inside += area;
-                }
+            let (area, scale) = (
+                surface.face_area(face),
+                self.scale_at(surface, face, [1.0 / 3.0; 3]),
+            );
+            total += area;
+            if (1.0 - 1e-9..=sigma + 1e-9).contains(&scale) {
+                summary.inside += area;
             }
         }
         summary.inside /= f64::max(total, f64::MIN_POSITIVE);
         summary
     }
 
+    /// The faces with a corner farther than `exclude_mm` (on the flat sheet) from every cone.
+    fn far_from_cones<'s>(
+        &'s self,
+        surface: &'s Surface,
+        exclude_mm: f64,
+    ) -> impl Iterator<Item = (FaceId, &'s [VertexId; 3])> {
+        let far = move |v: &VertexId| self.cone_distance_mm[*v] > exclude_mm;
+        surface
+            .faces()
+            .iter_ids()
+            .filter(move |(_, v)| v.iter().any(far))
+    }
+
     /// The smallest λ of the window [λ, σ λ] that leaves least of the surface outside, the cones' neighbourhoods left
     /// out, and what is below it counted many times: to shrink is harder for a sheet than to bridge a dent.
     pub fn best_window(&self, surface: &Surface, exclude_mm: f64, sigma: f64) -> f64 {
-        let mut parts: Vec<(f64, f64)> = surface
-            .faces()
-            .iter_ids()
-            .filter(|(_, v)| v.iter().any(|&v| self.cone_distance_mm[v] > exclude_mm))
+        let mut parts: Vec<(f64, f64)> = self
+            .far_from_cones(surface, exclude_mm)
             .map(|(face, v)| {
                 let mean = v.iter().map(|&v| self.log_scale[v]).sum::<f64>() / 3.0;
                 (mean, surface.face_area(face))

@@ -11,6 +11,7 @@ mod cut;
 mod distance;
 mod layout;
 mod metric;
+mod paths;
 mod propose;
 mod search;
 

@@ -1,8 +1,7 @@
 //! From a surface to a layout at its true size: which singularities, how large on the sheet, how long the triangle edge.
 
 use super::{
-    CURVATURE_UNIT, Cone, ConformalError, Layout, Metric, MetricSolver, ScaleSummary,
-    Singularities, cut_graph,
+    Cone, ConformalError, Layout, Metric, MetricSolver, ScaleSummary, Singularities, cut_graph,
 };
 use crate::base::progress::Progress;
 use crate::mesh::{Surface, VertexId};
@@ -32,8 +31,6 @@ pub enum Sizing {
 pub struct FlattenOptions {
     /// Largest scale factor that the material allows.
     pub sigma: f64,
-    /// Cones wanted.
-    pub cones: ConeRequest,
     /// Triangle size.
     pub sizing: Sizing,
     /// Radius around a cone, in triangle edges, in which λ is ignored: it runs to 0 or ∞ there, but no triangle's
@@ -72,11 +69,12 @@ const FLOOR_WITH_CONES: f64 = 1.15;
 /// [`ConformalError`]: impossible singularities, no convergence, interruption.
 pub fn flatten(
     surface: &Surface,
+    cones: &ConeRequest,
     options: &FlattenOptions,
     progress: &dyn Progress,
 ) -> Result<Flattened, ConformalError> {
     let mut solver = MetricSolver::new(surface)?;
-    match &options.cones {
+    match cones {
         ConeRequest::Given(given) => Flattened::solve(&mut solver, given, options, progress),
         ConeRequest::Auto => {
             let plain = choose_turnings(&mut solver, &[], options, progress)?;
@@ -214,16 +212,9 @@ pub fn choose_turnings(
     progress: &dyn Progress,
 ) -> Result<Flattened, ConformalError> {
     let surface = solver.surface();
-    let turnings: Vec<i32> = surface
-        .rims()
-        .iter()
-        .skip(1)
-        .map(|rim| (surface.rim_turning(rim) / CURVATURE_UNIT).round() as i32)
-        .collect();
-    let stretch = |flat: &Flattened| flat.scale.max / flat.scale.min;
     let start = Singularities {
         cones: cones.to_vec(),
-        turnings,
+        turnings: Singularities::natural_turnings(surface),
     };
     let mut best = Flattened::solve(solver, &start, options, progress)?;
     let mut improved = true;
@@ -234,7 +225,7 @@ pub fn choose_turnings(
                 let mut tried = best.singularities.clone();
                 tried.turnings[rim] += step;
                 let flat = Flattened::solve(solver, &tried, options, progress)?;
-                if stretch(&flat) < stretch(&best) {
+                if flat.scale.ratio() < best.scale.ratio() {
                     best = flat;
                     improved = true;
                 }

@@ -13,12 +13,10 @@
 //!
 //! On a closed surface the units of all cones sum to 3χ. While fewer are placed the rest is spread over the area.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use nalgebra::Point3;
 
 use super::metric::LinearModel;
+use super::paths::ShortestPaths;
 use super::{Cone, ConformalError, MetricSolver, Singularities};
 use crate::base::ids::Per;
 use crate::base::progress::Progress;
@@ -86,32 +84,10 @@ pub fn search(
 /// Vertices spread evenly over the surface (farthest-point sampling by edge paths, away from the rims), after the
 /// extremes of u: the places where a cone helps most.
 fn candidates(surface: &Surface, u: &Per<VertexId, f64>, edge_mm: f64) -> Vec<VertexId> {
-    let count = surface.positions().len();
-    let mut distance = Per::<VertexId, f64>::filled(count, f64::INFINITY);
-    let spread = |seeds: &[VertexId], distance: &mut Per<VertexId, f64>| {
-        let mut queue = BinaryHeap::new();
-        for &seed in seeds {
-            distance[seed] = 0.0;
-            queue.push(Reverse((0u64, seed)));
-        }
-        while let Some(Reverse((bits, here))) = queue.pop() {
-            let so_far = f64::from_bits(bits);
-            if so_far > distance[here] {
-                continue;
-            }
-            for h in surface.around(here) {
-                let (next, length) = (surface.head(h), so_far + surface.length(h));
-                if length < distance[next] {
-                    distance[next] = length;
-                    queue.push(Reverse((length.to_bits(), next)));
-                }
-            }
-        }
-    };
     let rims: Vec<VertexId> = surface.rims().iter().flatten().copied().collect();
-    let mut from_rim = distance.clone();
-    spread(&rims, &mut from_rim);
-    let inside = |v: VertexId| from_rim[v] > APART * edge_mm;
+    let mut from_rim = ShortestPaths::new(surface);
+    from_rim.extend(&rims, |_| false);
+    let inside = |v: VertexId| from_rim.distance[v] > APART * edge_mm;
     let extreme = |v: VertexId| {
         let around = || surface.around(v).map(|h| u[surface.head(h)]);
         around().all(|x| x < u[v]) || around().all(|x| x > u[v])
@@ -121,14 +97,15 @@ fn candidates(surface: &Surface, u: &Per<VertexId, f64>, edge_mm: f64) -> Vec<Ve
         .ids()
         .filter(|&v| inside(v) && extreme(v))
         .collect();
-    let mean = u.iter().sum::<f64>() / count as f64;
+    let mean = u.iter().sum::<f64>() / u.len() as f64;
     let off = |v: VertexId| (u[v] - mean).abs();
     peaks.sort_by(|a, b| off(*b).total_cmp(&off(*a)).then(a.cmp(b)));
     let mut chosen: Vec<VertexId> = Vec::new();
+    let mut paths = ShortestPaths::new(surface);
     for peak in peaks {
-        if chosen.len() < CANDIDATES / 4 && distance[peak] > 2.0 * edge_mm {
+        if chosen.len() < CANDIDATES / 4 && paths.distance[peak] > 2.0 * edge_mm {
             chosen.push(peak);
-            spread(&[peak], &mut distance);
+            paths.extend(&[peak], |_| false);
         }
     }
     while chosen.len() < CANDIDATES {
@@ -136,12 +113,15 @@ fn candidates(surface: &Surface, u: &Per<VertexId, f64>, edge_mm: f64) -> Vec<Ve
             .positions()
             .ids()
             .filter(|&v| inside(v))
-            .max_by(|a, b| distance[*a].total_cmp(&distance[*b]).then(b.cmp(a)));
-        let Some(next) = farthest.filter(|v| distance[*v] > 0.0) else {
+            .max_by(|a, b| {
+                let far = |v: &VertexId| paths.distance[*v];
+                far(a).total_cmp(&far(b)).then(b.cmp(a))
+            });
+        let Some(next) = farthest.filter(|v| paths.distance[*v] > 0.0) else {
             break;
         };
         chosen.push(next);
-        spread(&[next], &mut distance);
+        paths.extend(&[next], |_| false);
     }
     chosen
 }
@@ -176,7 +156,7 @@ struct Field {
     window: f64,
     clear_mm: f64,
     apart_mm: f64,
-    /// Scratch: u and weight of the set that is priced.
+    /// Scratch: ln λ and weight of the set that is priced.
     scratch: Vec<(f64, f64)>,
 }
 
@@ -195,44 +175,39 @@ impl Field {
         let samples: Vec<VertexId> = surface.positions().ids().filter(chosen).collect();
         let mut area = Per::<VertexId, f64>::filled(count, 0.0);
         for (face, v) in surface.faces().iter_ids() {
-            v.iter()
-                .for_each(|&v| area[v] += surface.face_area(face) / 3.0);
+            let third = surface.face_area(face) / 3.0;
+            v.iter().for_each(|&v| area[v] += third);
         }
         let all: f64 = samples.iter().map(|&v| area[v]).sum();
         let take = |u: &Per<VertexId, f64>| samples.iter().map(|&v| u[v]).collect::<Vec<f64>>();
         let base = take(model.start());
         let even = take(&model.spread(&area));
-        let mut columns = Vec::with_capacity(places.len());
-        for &place in places {
-            progress.check()?;
-            columns.push(take(&model.cone(place)));
-        }
         let rims = (1..surface.rims().len())
             .map(|r| take(&model.rim(r)))
             .collect();
         let euler = surface.euler_characteristic() as i32;
-        Ok(Self {
-            at: places.iter().map(|&v| surface.position(v)).collect(),
-            places: places.to_vec(),
+        let mut field = Self {
+            places: Vec::new(),
+            at: Vec::new(),
+            columns: Vec::new(),
             positions: samples.iter().map(|&v| surface.position(v)).collect(),
             weight: samples.iter().map(|&v| area[v] / all).collect(),
             scratch: Vec::with_capacity(samples.len()),
             samples,
             base,
-            columns,
             rims,
             even,
             total: surface.rims().is_empty().then_some(3 * euler),
-            start: surface
-                .rims()
-                .iter()
-                .skip(1)
-                .map(|rim| (surface.rim_turning(rim) / super::CURVATURE_UNIT).round() as i32)
-                .collect(),
+            start: Singularities::natural_turnings(surface),
             window: (options.sigma / (MARGIN * MARGIN)).max(1.02).ln(),
             clear_mm: CLEARANCE * options.edge_mm,
             apart_mm: APART * options.edge_mm,
-        })
+        };
+        for &place in places {
+            progress.check()?;
+            field.place(model, surface, place);
+        }
+        Ok(field)
     }
 
     fn singularities(&self, set: &Set) -> Singularities {
@@ -306,15 +281,7 @@ impl Field {
                 a = middle;
             }
         }
-        let toll: f64 = set
-            .cones
-            .iter()
-            .map(|&(_, units)| {
-                let each = if units > 0 { TOLL } else { TOLL_NEGATIVE };
-                each * f64::from(units * units)
-            })
-            .sum();
-        slope_and_excess(0.5 * (a + b)).1 + toll
+        slope_and_excess(0.5 * (a + b)).1 + self.toll(set)
     }
 
     /// Greedy descent; every set that was the best for its time, the last one last.
@@ -373,16 +340,15 @@ impl Field {
                     }
                 }
             }
-            let Some((found, set)) = winner else { break };
-            if !must && found >= price * (1.0 - 1e-9) {
+            let Some(mut next) = winner else { break };
+            if !must && next.0 >= price * (1.0 - 1e-9) {
                 // A pair of opposite cones may help where neither does alone.
-                let Some((found, set)) = self.pair(&best, price, progress)? else {
+                let Some(pair) = self.pair(&best, price, progress)? else {
                     break;
                 };
-                (best, price) = (set, found);
-            } else {
-                (best, price) = (set, found);
+                next = pair;
             }
+            (price, best) = next;
             passed.push(best.clone());
         }
         Ok(passed)

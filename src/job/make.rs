@@ -215,7 +215,7 @@ fn decided(
             orientation_deg: shape.orientation_deg,
             pattern: request.handedness,
             remove_at_cone: shape.removed,
-            rim_turnings_deg: shape.turnings.iter().map(|t| 120 * t).collect(),
+            rim_turnings_deg: shape.flat.singularities.rim_turnings_deg(),
         },
         solve: SolveChoice {
             solver: request.solver,

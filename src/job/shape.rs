@@ -12,8 +12,8 @@ use super::verdict::{Verdict, place};
 use crate::base::progress::Progress;
 use crate::base::units::short;
 use crate::conformal::{
-    Cone, ConeRequest, ConformalError, FlattenOptions, Flattened, MetricSolver, SearchOptions,
-    Singularities, Sizing, choose_turnings, search,
+    Cone, ConformalError, FlattenOptions, Flattened, MetricSolver, SearchOptions, Singularities,
+    Sizing, choose_turnings, search,
 };
 use crate::linkage::{Built, Linkage, LinkageOptions, build, fit};
 use crate::machine::Machine;
@@ -41,8 +41,6 @@ pub(crate) struct Shape {
     pub built: Built,
     /// Triangles removed at each positive cone.
     pub removed: usize,
-    /// Turning of each rim but the first, in units of 120°.
-    pub turnings: Vec<i32>,
     /// Direction of the lattice against the layout's X, degrees.
     pub orientation_deg: f64,
     /// Angle distortion that fitting the lattice to the seams added, root mean square; 0 for none.
@@ -126,7 +124,6 @@ fn maps(
     let mut solver = MetricSolver::new(surface).map_err(MakeError::Conformal)?;
     let options = |removal: usize| FlattenOptions {
         sigma,
-        cones: ConeRequest::Auto,
         sizing: request.sizing,
         cone_clearance: clearance(removal),
     };
@@ -171,10 +168,7 @@ fn maps(
                 }
                 plain => plain.map_err(MakeError::Conformal)?,
             };
-            if maps
-                .first()
-                .is_some_and(|m| m.flat.scale.max <= m.flat.scale.min * sigma)
-            {
+            if maps.first().is_some_and(|m| m.flat.scale.within(sigma)) {
                 return Ok(maps);
             }
             // The obvious cone; the search may find a better one, or that none is worth its price.
@@ -215,7 +209,7 @@ fn maps(
     // A map within [1, σ] comes first, the one that removes least of those; else the one that leaves least of the
     // surface outside. The sort is stable.
     let outside = |map: &Map| {
-        if map.flat.scale.max <= map.flat.scale.min * sigma {
+        if map.flat.scale.within(sigma) {
             0.0
         } else {
             1.0 - map.flat.scale.inside
@@ -283,12 +277,10 @@ fn attempt(
         request.accept_distance,
         request.cones == ConeWish::Auto,
     );
-    let turnings = flat.singularities.turnings.clone();
     Ok(Shape {
         flat,
         built,
         removed: map.removal,
-        turnings,
         orientation_deg,
         distortion,
         sheet,
@@ -325,67 +317,48 @@ fn lay_out(
         };
         map.flat.clone().resize(surface, &options)
     };
-    let lay = |sizing: Sizing| -> Result<Laid, MakeError> {
-        let mut flat = resized(sizing);
-        let mut orientation_deg = request.orientation_deg;
-        if let Sizing::Triangles(_) = sizing {
-            let free = fit(
-                surface,
-                &flat.layout,
-                flat.edge_mm,
-                false,
-                orientation_deg,
-                progress,
-            )
-            .map_err(MakeError::Linkage)?;
-            orientation_deg = Some(free.orientation_deg);
-            flat = resized(Sizing::EdgeMm(free.edge_mm));
-        }
-        // Whatever chose edge and orientation, the result is the one that these two alone would give, to the last bit.
-        let first = fit(
+    let fitted = |flat: &Flattened, exact: bool, orientation_deg: Option<f64>| {
+        fit(
             surface,
             &flat.layout,
             flat.edge_mm,
-            true,
+            exact,
             orientation_deg,
             progress,
         )
-        .map_err(MakeError::Linkage)?;
-        let fitted = match orientation_deg {
-            Some(_) => first,
-            None => fit(
-                surface,
-                &flat.layout,
-                flat.edge_mm,
-                true,
-                Some(first.orientation_deg),
-                progress,
-            )
-            .map_err(MakeError::Linkage)?,
-        };
+        .map_err(MakeError::Linkage)
+    };
+    let lay = |mut flat: Flattened, exact: bool| -> Result<Laid, MakeError> {
+        let mut fit = fitted(&flat, exact, request.orientation_deg)?;
+        if !exact || request.orientation_deg.is_none() {
+            // Whatever chose edge and orientation, the result is the one that these two alone would give, to the last
+            // bit.
+            flat = resized(Sizing::EdgeMm(fit.edge_mm));
+            fit = fitted(&flat, true, Some(fit.orientation_deg))?;
+        }
         let lattice = LinkageOptions {
-            edge_mm: fitted.edge_mm,
-            orientation: fitted.orientation_deg.to_radians(),
+            edge_mm: fit.edge_mm,
+            orientation: fit.orientation_deg.to_radians(),
             handedness: request.handedness,
             remove_at_cone: map.removal,
             sigma,
         };
-        let built =
-            build(surface, &fitted.layout, &lattice, progress).map_err(MakeError::Linkage)?;
-        flat.layout = fitted.layout;
+        let built = build(surface, &fit.layout, &lattice, progress).map_err(MakeError::Linkage)?;
+        flat.layout = fit.layout;
         Ok(Laid {
             flat,
             built,
-            orientation_deg: fitted.orientation_deg,
-            distortion: fitted.distortion,
+            orientation_deg: fit.orientation_deg,
+            distortion: fit.distortion,
         })
     };
-    let laid = lay(request.sizing)?;
-    if let Sizing::Triangles(wanted) = request.sizing {
-        let got = laid.built.linkage.triangles.len() as f64;
-        return lay(Sizing::Triangles(wanted * wanted / got));
+    match request.sizing {
+        Sizing::EdgeMm(_) => lay(map.flat.clone(), true),
+        Sizing::Triangles(wanted) => {
+            let got = lay(map.flat.clone(), false)?.built.linkage.triangles.len() as f64;
+            lay(resized(Sizing::Triangles(wanted * wanted / got)), false)
+        }
     }
-    Ok(laid)
 }
 
 /// Radius around a cone, in L, that no triangle's centre comes within: 1/√3 with all triangles in place, 2/√3 without
@@ -414,9 +387,9 @@ fn describe_map(flat: &Flattened, surface: &Surface, sigma: f64) -> String {
     };
     let turnings: Vec<String> = flat
         .singularities
-        .turnings
+        .rim_turnings_deg()
         .iter()
-        .map(|t| format!("{}°", 120 * t))
+        .map(|deg| format!("{deg}°"))
         .collect();
     let rims = match turnings.len() {
         0 => String::new(),

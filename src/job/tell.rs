@@ -209,7 +209,7 @@ pub(crate) fn figures(
                 "at_mm": surface.position(c.vertex).coords.as_slice(),
                 "units": c.units,
             })).collect::<Vec<_>>(),
-            "rim_turnings_deg": shape.turnings.iter().map(|t| 120 * t).collect::<Vec<_>>(),
+            "rim_turnings_deg": flat.singularities.rim_turnings_deg(),
             "distortion_of_fit": shape.distortion,
             "broken_faces": flat.metric.broken.len(),
             "lambda_min": flat.scale.min,

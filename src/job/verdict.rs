@@ -156,7 +156,7 @@ pub(crate) fn place(p: Point3<f64>) -> String {
 
 /// What the conformal map says about stretching: how much would be needed, where, and what helps.
 fn stretch_advice(flat: &Flattened, surface: &Surface, sigma: f64, cone_tried: bool) -> String {
-    let needed = flat.scale.max / flat.scale.min;
+    let needed = flat.scale.ratio();
     if needed <= sigma + SIGMA_TOLERANCE {
         return "σ would suffice for the smooth surface, so the triangles are too large for its detail: use smaller ones (--triangles or --edge)".into();
     }

@@ -311,18 +311,11 @@ pub(crate) fn core(laid: &[Laid], keep: impl Fn(usize) -> bool) -> (Vec<Laid>, u
 /// proportion around one of two, whose own two go in any case: they share two sides and cannot both be hinged.
 pub(crate) fn around_cones(laid: &[Laid], count: usize) -> Vec<bool> {
     let net = Net::new(laid);
-    let mut at_node = vec![Vec::new(); net.flat.len()];
-    for (side, &node) in net
-        .node
-        .iter()
-        .enumerate()
-        .filter(|(_, node)| !net.rim[**node])
-    {
-        at_node[node].push(side / 3);
-    }
+    let around = |node: usize| net.leaving[node].iter().map(|side| side / 3);
+    let inner = |node: &usize| !net.rim[*node];
     let mut removed = vec![false; laid.len()];
-    for node in (0..at_node.len()).filter(|&node| !net.rim[node]) {
-        let size = at_node[node].len();
+    for node in (0..net.rim.len()).filter(inner) {
+        let size = net.leaving[node].len();
         if size >= 6 {
             continue;
         }
@@ -330,7 +323,7 @@ pub(crate) fn around_cones(laid: &[Laid], count: usize) -> Vec<bool> {
             .div_ceil(4)
             .max(if size < 3 { size } else { 0 });
         let mut taken = Vec::new();
-        let mut ring = at_node[node].clone();
+        let mut ring: Vec<usize> = around(node).collect();
         while taken.len() < wanted && !ring.is_empty() {
             ring.sort_unstable();
             ring.dedup();
@@ -340,8 +333,9 @@ pub(crate) fn around_cones(laid: &[Laid], count: usize) -> Vec<bool> {
             ring = ring
                 .iter()
                 .flat_map(|&t| 3 * t..3 * t + 3)
-                .flat_map(|side| &at_node[net.node[side]])
-                .copied()
+                .map(|side| net.node[side])
+                .filter(inner)
+                .flat_map(around)
                 .collect();
         }
         taken.iter().for_each(|&t| removed[t] = true);

@@ -26,7 +26,7 @@ use crate::mesh::{FaceId, HalfedgeId, Surface, VertexId};
 type C = Complex<f64>;
 
 /// Part of L by which a lattice may be larger or smaller than asked, where its size is left open.
-pub const SIZE_ROOM: f64 = 0.04;
+const SIZE_ROOM: f64 = 0.04;
 
 /// Weight of stretching against shearing in a warp: enough to keep it unique and smooth, little enough that the chart
 /// rather swells a little than loses its angles.
@@ -41,7 +41,8 @@ pub struct Fitted {
     pub edge_mm: f64,
     /// Direction of the lattice against the layout's X, degrees.
     pub orientation_deg: f64,
-    /// Root mean square over the sheet of |∂̄d|, the angle distortion that warping added; 0 if nothing was warped.
+    /// Root mean square over the sheet of (|∂̄d|² + 10⁻³ |∂d|²)^½ for the displacement d that warping added: in the main
+    /// the distortion of angles; 0 if nothing was warped.
     pub distortion: f64,
 }
 
@@ -106,13 +107,24 @@ enum Node {
 enum Rule {
     /// The segment's own translation is free value `value`.
     Free { segment: usize, value: usize },
-    /// The segment towards the root follows from the others around the vertex, at which the cone sits at free value
-    /// `value`; a branch is no cone and sits anywhere.
-    Around {
-        segment: usize,
-        vertex: VertexId,
-        value: Option<usize>,
-    },
+    /// The segment towards the root follows from the others around the vertex, a cone or a branch.
+    Around { segment: usize, vertex: VertexId },
+}
+
+/// Where a cone sits.
+#[derive(Clone, Copy, Debug)]
+struct Seat {
+    /// The halfedge that leaves it, in the chart of whose face its position is measured.
+    at: HalfedgeId,
+    /// The free value that is its position; the root's position is fixed.
+    value: Option<usize>,
+}
+
+impl Seat {
+    fn position(&self, layout: &Layout) -> C {
+        let p = layout.corners[self.at.face()][self.at.corner()];
+        C::new(p.x, p.y)
+    }
 }
 
 /// The free values of a cut chart, and how the transitions follow from them.
@@ -125,10 +137,8 @@ struct Frame {
     segment_of: BTreeMap<HalfedgeId, (usize, bool)>,
     /// The measured rotations of the segments.
     turns: Vec<C>,
-    /// Free value of each cone's position.
-    cone_value: BTreeMap<VertexId, Option<usize>>,
-    /// The face in whose chart the position of a cone is its free value.
-    cone_face: BTreeMap<VertexId, HalfedgeId>,
+    /// The cones.
+    seats: BTreeMap<VertexId, Seat>,
 }
 
 impl Frame {
@@ -187,17 +197,14 @@ impl Frame {
             values: Vec::new(),
             segment_of,
             turns: layout.segments.iter().map(|s| s.transition.turn).collect(),
-            cone_value: BTreeMap::new(),
-            cone_face: BTreeMap::new(),
+            seats: BTreeMap::new(),
         };
         let is_cone = |v: VertexId| layout.cones.iter().any(|c| c.vertex == v);
         if let Some(Node::Vertex(v)) = root
             && is_cone(v)
+            && let Some(at) = surface.around(v).next()
         {
-            frame.cone_value.insert(v, None);
-            if let Some(h) = surface.around(v).next() {
-                frame.cone_face.insert(v, h);
-            }
+            frame.seats.insert(v, Seat { at, value: None });
         }
         for s in (0..ends.len()).filter(|&s| !in_tree[s]) {
             frame.free(s, layout.segments[s].transition.shift);
@@ -206,18 +213,15 @@ impl Frame {
             match node {
                 Node::Rim(_) => frame.free(segment, layout.segments[segment].transition.shift),
                 Node::Vertex(vertex) => {
-                    let value = is_cone(vertex).then(|| {
-                        frame.cone_value.insert(vertex, Some(frame.values.len()));
-                        frame.cone_face.insert(vertex, outgoing);
-                        let p = layout.corners[outgoing.face()][outgoing.corner()];
-                        frame.values.push(C::new(p.x, p.y));
-                        frame.values.len() - 1
-                    });
-                    frame.rules.push(Rule::Around {
-                        segment,
-                        vertex,
-                        value,
-                    });
+                    if is_cone(vertex) {
+                        let seat = Seat {
+                            at: outgoing,
+                            value: Some(frame.values.len()),
+                        };
+                        frame.values.push(seat.position(layout));
+                        frame.seats.insert(vertex, seat);
+                    }
+                    frame.rules.push(Rule::Around { segment, vertex });
                 }
             }
         }
@@ -240,31 +244,23 @@ impl Frame {
             }
             _ => None,
         };
-        let root_cone = self.cone_value.iter().find(|(_, value)| value.is_none());
-        let cone = self.cone_value.values().flatten().max();
-        let origin = match (root_cone, cone) {
-            (Some((vertex, _)), _) => self.cone_face.get(vertex).map(|h| {
-                let p = layout.corners[h.face()][h.corner()];
-                C::new(p.x, p.y)
-            }),
-            (None, Some(&value)) => Some(self.values[value]),
-            (None, None) => self.rules.iter().find_map(fixed),
+        let root = self.seats.values().find(|seat| seat.value.is_none());
+        let last = self.seats.values().max_by_key(|seat| seat.value);
+        let cone = root.or(last).map(|seat| seat.position(layout));
+        let Some(origin) = cone.or_else(|| self.rules.iter().find_map(fixed)) else {
+            return;
         };
-        let Some(origin) = origin else { return };
         layout.moved(&Transition {
             turn: one,
             shift: -origin,
         });
         for rule in &self.rules {
-            match *rule {
-                Rule::Free { segment, value } => {
-                    self.values[value] -= (one - self.turns[segment]) * origin;
-                }
-                Rule::Around {
-                    value: Some(value), ..
-                } => self.values[value] -= origin,
-                Rule::Around { .. } => {}
+            if let Rule::Free { segment, value } = *rule {
+                self.values[value] -= (one - self.turns[segment]) * origin;
             }
+        }
+        for value in self.seats.values().filter_map(|seat| seat.value) {
+            self.values[value] -= origin;
         }
         // What was moved to 0 is 0, without rounding.
         let tiny = 1e-12 * (layout.area_mm2().sqrt() + origin.modulus());
@@ -288,11 +284,7 @@ impl Frame {
         for rule in &self.rules {
             match *rule {
                 Rule::Free { segment, value } => over[segment].shift = values[value],
-                Rule::Around {
-                    segment,
-                    vertex,
-                    value,
-                } => {
+                Rule::Around { segment, vertex } => {
                     // Counter-clockwise from the own segment once around, back to just before it.
                     let spokes: Vec<HalfedgeId> = surface
                         .around(vertex)
@@ -316,6 +308,8 @@ impl Frame {
                         over[segment].turn
                     };
                     let turn = own_turn * others.turn;
+                    // A branch turns about nothing, wherever it is.
+                    let value = self.seats.get(&vertex).and_then(|seat| seat.value);
                     let place = value.map_or(C::new(0.0, 0.0), |v| values[v]);
                     let about = Transition {
                         turn,
@@ -342,7 +336,9 @@ impl Frame {
 
 /// How the chart follows a change of the free values.
 struct Warp {
-    /// Rotation from each vertex' first wedge to the wedge of each corner.
+    /// The motion from the first wedge of a vertex to that of each corner, for the corners of vertices on the cut.
+    wedges: BTreeMap<(FaceId, usize), Transition>,
+    /// The rotation of the same, for all corners.
     turn: Per<FaceId, [C; 3]>,
     /// Displacement of every vertex in its first wedge, for a unit change of each free value.
     response: Vec<Per<VertexId, C>>,
@@ -385,7 +381,7 @@ impl Warp {
                 .iter()
                 .all(|t| (t - C::new(1.0, 0.0)).modulus() < 0.5);
         for vertex in surface.positions().ids().skip(usize::from(floating)) {
-            if !frame.cone_value.contains_key(&vertex) {
+            if !frame.seats.contains_key(&vertex) {
                 row[vertex] = rows as u32;
                 rows += 1;
             }
@@ -423,6 +419,7 @@ impl Warp {
         }
         cholesky.factor(&matrix)?;
         let mut warp = Self {
+            wedges,
             turn,
             response: Vec::new(),
             price: DMatrix::zeros(frame.values.len(), frame.values.len()),
@@ -432,14 +429,9 @@ impl Warp {
         for k in 0..frame.values.len() {
             let mut values = frame.values.clone();
             values[k] += 1.0;
-            let changed = wedges_change(surface, frame, &wedges, &values);
-            let mut d = cone_displacements(surface, frame, &wedges, &changed, |value| {
-                if value == k {
-                    C::new(1.0, 0.0)
-                } else {
-                    C::new(0.0, 0.0)
-                }
-            });
+            let over = frame.transitions(surface, &values);
+            let changed = warp.offsets(surface, frame, &over);
+            let mut d = warp.cone_displacements(surface, frame, &changed, k);
             rhs.fill(0.0);
             for (face, v) in surface.faces().iter_ids() {
                 let known = warp.corner_values(face, v, &d, &changed);
@@ -488,6 +480,39 @@ impl Warp {
         Ok(warp)
     }
 
+    /// How the wedges' translations differ with other transitions.
+    fn offsets(
+        &self,
+        surface: &Surface,
+        frame: &Frame,
+        over: &[Transition],
+    ) -> BTreeMap<(FaceId, usize), C> {
+        wedges(surface, frame, over)
+            .into_iter()
+            .map(|(key, after)| (key, after.shift - self.wedges[&key].shift))
+            .collect()
+    }
+
+    /// Displacements of the cones in their first wedges, 0 elsewhere, where free value `changed` grows by 1: it moves its
+    /// cone in the wedge in which it was measured.
+    fn cone_displacements(
+        &self,
+        surface: &Surface,
+        frame: &Frame,
+        offsets: &BTreeMap<(FaceId, usize), C>,
+        changed: usize,
+    ) -> Per<VertexId, C> {
+        let mut d = Per::filled(surface.positions().len(), C::new(0.0, 0.0));
+        for (vertex, seat) in &frame.seats {
+            let key = (seat.at.face(), seat.at.corner());
+            let there = C::new(f64::from(u8::from(seat.value == Some(changed))), 0.0);
+            if let (Some(motion), Some(offset)) = (self.wedges.get(&key), offsets.get(&key)) {
+                d[*vertex] = motion.turn.conj() * (there - offset);
+            }
+        }
+        d
+    }
+
     /// Displacements of a face's corners in its own chart.
     fn corner_values(
         &self,
@@ -511,16 +536,11 @@ impl Warp {
         rounded: &[C],
         lattice: &Lattice,
     ) -> Option<Layout> {
-        let measured = frame.transitions(surface, &frame.values);
         let mut whole = frame.transitions(surface, rounded);
         whole
             .iter_mut()
             .for_each(|t| t.shift = lattice.nearest(t.shift));
-        let before = wedges(surface, frame, &measured);
-        let offsets: BTreeMap<(FaceId, usize), C> = wedges(surface, frame, &whole)
-            .into_iter()
-            .map(|(key, after)| (key, after.shift - before[&key].shift))
-            .collect();
+        let offsets = self.offsets(surface, frame, &whole);
         let mut d = Per::filled(surface.positions().len(), C::new(0.0, 0.0));
         for (k, response) in self.response.iter().enumerate() {
             let change = rounded[k] - frame.values[k];
@@ -590,40 +610,6 @@ fn wedges(
         }
     }
     found
-}
-
-/// How the wedges' translations differ for other free values.
-fn wedges_change(
-    surface: &Surface,
-    frame: &Frame,
-    before: &BTreeMap<(FaceId, usize), Transition>,
-    values: &[C],
-) -> BTreeMap<(FaceId, usize), C> {
-    wedges(surface, frame, &frame.transitions(surface, values))
-        .into_iter()
-        .map(|(key, after)| (key, after.shift - before[&key].shift))
-        .collect()
-}
-
-/// Displacements of the cones in their first wedges, 0 elsewhere; `change` of a free value moves the cone in the wedge
-/// in which that value was measured.
-fn cone_displacements(
-    surface: &Surface,
-    frame: &Frame,
-    wedges: &BTreeMap<(FaceId, usize), Transition>,
-    offsets: &BTreeMap<(FaceId, usize), C>,
-    change: impl Fn(usize) -> C,
-) -> Per<VertexId, C> {
-    let mut d = Per::filled(surface.positions().len(), C::new(0.0, 0.0));
-    for (vertex, value) in &frame.cone_value {
-        let h = frame.cone_face[vertex];
-        let key = (h.face(), h.corner());
-        let there = value.map_or(C::new(0.0, 0.0), &change);
-        if let (Some(motion), Some(offset)) = (wedges.get(&key), offsets.get(&key)) {
-            d[*vertex] = motion.turn.conj() * (there - offset);
-        }
-    }
-    d
 }
 
 /// A lattice worth trying.

@@ -1,8 +1,9 @@
 //! Stage 3: the flat layout and a triangle lattice become a [`Linkage`]: rigid triangles joined in pairs.
 //!
-//! [`build`] lays a lattice of edge L on the [`Layout`], with a vertex on the cone where there is one, keeps the
-//! triangles that lie wholly on the surface and are held by at least two others, cuts the seam along lattice lines,
-//! places every triangle flat and closed on the sheet, and lifts the linkage, opened as λ asks, back onto the surface.
+//! [`fit`] warps a [`Layout`] so that a lattice goes on across its seams, with a vertex on every cone. [`build`] lays
+//! the lattice of edge L on it, keeps the triangles that lie wholly on the surface and are held by at least two others,
+//! cuts the seam along lattice lines, places every triangle flat and closed on the sheet, and lifts the linkage, opened
+//! as λ asks, back onto the surface.
 //! [`write_obj`] is the format that other programs read.
 
 mod clip;
@@ -18,7 +19,7 @@ mod walk;
 
 use nalgebra::{Point2, Point3};
 
-pub use continuity::{Fitted, SIZE_ROOM, fit};
+pub use continuity::{Fitted, fit};
 pub use lattice::Lattice;
 pub use lift::opening_turn;
 pub use obj::write_obj;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::surface::{FaceId, Surface, VertexId};
+use super::surface::{FaceId, HalfedgeId, Surface, VertexId};
 use crate::base::ids::Per;
 
 /// Figures of a surface. Lengths are millimetres; angles are degrees, as they are for people to read.
@@ -69,11 +69,10 @@ impl Inspection {
             let p = surface.corners(face);
             let mut squares = 0.0;
             for k in 0..3 {
-                let (u, v) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
-                let angle = u.cross(&v).norm().atan2(u.dot(&v));
+                let angle = surface.corner_angle(HalfedgeId::side(face, k));
                 angle_sum[vertices[k]] += angle;
                 least = least.min(angle);
-                squares += u.norm_squared();
+                squares += (p[(k + 1) % 3] - p[k]).norm_squared();
             }
             let quality = 4.0 * 3f64.sqrt() * surface.face_area(face) / squares;
             if quality < worst.0 {

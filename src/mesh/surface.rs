@@ -255,10 +255,8 @@ impl Surface {
             let Some(normal) = self.face_normal_doubled(face).try_normalize(0.0) else {
                 continue;
             };
-            let p = self.corners(face);
             for k in 0..3 {
-                let (u, v) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
-                normals[corners[k]] += normal * u.cross(&v).norm().atan2(u.dot(&v));
+                normals[corners[k]] += normal * self.corner_angle(HalfedgeId::side(face, k));
             }
         }
         for n in normals.iter_mut() {
@@ -280,16 +278,17 @@ impl Surface {
         };
         (normal, up)
     }
+    /// Angle of a face at the tail of one of its halfedges, radians.
+    #[inline]
+    pub fn corner_angle(&self, halfedge: HalfedgeId) -> f64 {
+        let (p, k) = (self.corners(halfedge.face()), halfedge.corner());
+        let (u, v) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
+        u.cross(&v).norm().atan2(u.dot(&v))
+    }
     /// Turning of a rim: its total geodesic curvature with the surface on the left, radians.
     pub fn rim_turning(&self, rim: &[VertexId]) -> f64 {
-        let angle = |h: HalfedgeId| {
-            let (p, k) = (self.corners(h.face()), h.corner());
-            let (u, v) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
-            u.cross(&v).norm().atan2(u.dot(&v))
-        };
-        rim.iter()
-            .map(|&v| PI - self.around(v).map(angle).sum::<f64>())
-            .sum()
+        let angle_sum = |v: VertexId| self.around(v).map(|h| self.corner_angle(h)).sum::<f64>();
+        rim.iter().map(|&v| PI - angle_sum(v)).sum()
     }
     /// V − E + F.
     pub fn euler_characteristic(&self) -> i64 {

@@ -6,6 +6,7 @@ use kurbo::{Point, Rect};
 
 use super::contour;
 use crate::base::ids::{Id, Per};
+use crate::base::union::Union;
 use crate::linkage::{Linkage, Triangle, TriangleId};
 
 /// Largest neck c (the uncut end of a slit's lattice edge) in edge lengths.
@@ -312,14 +313,7 @@ fn flat_vertices(
     triangles: &Per<TriangleId, Triangle>,
     neighbours: &Per<TriangleId, [Option<(TriangleId, usize)>; 3]>,
 ) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0..3 * triangles.len() as u32).collect();
-    fn root(parent: &mut [u32], mut i: u32) -> u32 {
-        while parent[i as usize] != i {
-            parent[i as usize] = parent[parent[i as usize] as usize];
-            i = parent[i as usize];
-        }
-        i
-    }
+    let mut fans = Union::new(3 * triangles.len());
     for (t, sides) in neighbours.iter_ids() {
         for (k, across) in sides.iter().enumerate() {
             let Some((other, side)) = *across else {
@@ -327,15 +321,12 @@ fn flat_vertices(
             };
             // Neighbouring sides run in opposite directions.
             for (mine, theirs) in [(k, (side + 1) % 3), ((k + 1) % 3, side)] {
-                let a = root(&mut parent, (t.index() * 3 + mine) as u32);
-                let b = root(&mut parent, (other.index() * 3 + theirs) as u32);
-                // The smaller number stays root, so the result does not depend on the order of joining.
-                parent[a.max(b) as usize] = a.min(b);
+                fans.join(t.index() * 3 + mine, other.index() * 3 + theirs);
             }
         }
     }
-    (0..parent.len() as u32)
-        .map(|i| root(&mut parent, i))
+    (0..3 * triangles.len())
+        .map(|i| fans.root(i) as u32)
         .collect()
 }
 

@@ -30,12 +30,17 @@ fn job() -> Job {
     let surface = Surface::new(positions, faces).unwrap();
     let options = FlattenOptions {
         sigma: 2.0,
-        cones: ConeRequest::Given(Singularities::default()),
         sizing: Sizing::Triangles(120.0),
         cone_clearance: 0.7,
     };
     let quiet = crate::base::progress::Silent;
-    let flat = flatten(&surface, &options, &quiet).unwrap();
+    let flat = flatten(
+        &surface,
+        &ConeRequest::Given(Singularities::default()),
+        &options,
+        &quiet,
+    )
+    .unwrap();
     let options = LinkageOptions {
         edge_mm: flat.edge_mm,
         orientation: 0.0,
