@@ -9,8 +9,8 @@ use super::{Failure, Global, Terminal, print, print_json};
 use crate::base::atomic::check_directory;
 use crate::conformal::Sizing;
 use crate::job::{
-    ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, Design, FILES, Made, MakeError,
-    Request, Source, make,
+    ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, Design, FILES, Made,
+    MakeError, Request, Source, make,
 };
 use crate::linkage::Handedness;
 use crate::rationalize::Solver;
@@ -61,6 +61,9 @@ pub struct MakeArgs {
     /// auto, none, a point X,Y,Z or a vertex vN; :K after it is its curvature in units of 120° (1 if absent)
     #[arg(long = "cone", value_name = "CONE", allow_hyphen_values = true)]
     cones: Vec<ConeArg>,
+    /// auto, none, or an open cut past two or more places, X,Y,Z;X,Y,Z or vN;vN; repeatable
+    #[arg(long = "dart", value_name = "DART", allow_hyphen_values = true)]
+    darts: Vec<DartArg>,
     /// Triangles to drop at the cone: 4, 16, … [default: 4 at a positive cone, 16 where that fits better]
     #[arg(long, value_name = "N")]
     remove: Option<usize>,
@@ -138,6 +141,56 @@ impl std::str::FromStr for ConeArg {
             }
             _ => Err(form()),
         }
+    }
+}
+
+/// A value of `--dart`.
+#[derive(Clone, Debug, PartialEq)]
+enum DartArg {
+    Auto,
+    None,
+    Past(Vec<ConePlace>),
+}
+
+impl std::str::FromStr for DartArg {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => return Ok(Self::Auto),
+            "none" => return Ok(Self::None),
+            _ => {}
+        }
+        let places: Option<Vec<ConePlace>> = text
+            .split(';')
+            .map(|part| match part.trim().parse() {
+                Ok(ConeArg::At(place, _)) if !part.contains(':') => Some(place),
+                _ => None,
+            })
+            .collect();
+        match places {
+            Some(places) if places.len() > 1 => Ok(Self::Past(places)),
+            _ => Err(format!(
+                "{text:?} is not auto, none, or two or more places, for example \"0,12.5,80;0,60,20\" or \"v12;v905\""
+            )),
+        }
+    }
+}
+
+/// The darts that these arguments ask for.
+fn dart_wish(args: &[DartArg]) -> Result<DartWish, Failure> {
+    match args {
+        [] | [DartArg::Auto] => Ok(DartWish::Auto),
+        [DartArg::None] => Ok(DartWish::Given(Vec::new())),
+        many => many
+            .iter()
+            .map(|dart| match dart {
+                DartArg::Past(places) => Ok(places.clone()),
+                _ => Err(Failure::Bad(
+                    "--dart auto and --dart none stand alone".to_owned(),
+                )),
+            })
+            .collect::<Result<_, _>>()
+            .map(DartWish::Given),
     }
 }
 
@@ -233,6 +286,7 @@ fn decided_by_design(args: &MakeArgs) -> Vec<&'static str> {
         (args.hinge.is_some(), "--hinge"),
         (args.kerf.is_some(), "--kerf"),
         (!args.cones.is_empty(), "--cone"),
+        (!args.darts.is_empty(), "--dart"),
         (args.remove.is_some(), "--remove"),
         (!args.turnings.is_empty(), "--turning"),
         (args.orientation.0.is_some(), "--orientation"),
@@ -302,6 +356,7 @@ fn from_arguments(args: &MakeArgs) -> Result<Request, Failure> {
             (None, count) => Sizing::Triangles(count.unwrap_or(DEFAULT_TRIANGLES)),
         },
         cones: cone_wish(&args.cones)?,
+        darts: dart_wish(&args.darts)?,
         turnings: turning_wish(&args.turnings)?,
         orientation_deg: args.orientation.0,
         handedness: match args.pattern {

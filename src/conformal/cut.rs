@@ -88,7 +88,7 @@ pub(super) fn on_both_sides(surface: &Surface, edges: &[HalfedgeId]) -> Per<Half
 
 /// One edge for each generating loop: those that are left over by the shortest paths and by the dual spanning tree
 /// that crosses the edges with the longest loops first.
-fn loops(
+pub(super) fn loops(
     surface: &Surface,
     paths: &ShortestPaths<'_>,
     is_cut: &Per<HalfedgeId, bool>,

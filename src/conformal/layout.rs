@@ -85,7 +85,7 @@ const TURN_TOLERANCE: f64 = 1e-6;
 
 /// How much worse it is to ask the sheet to shrink than to stretch too far. Triangles can bridge a dent or a small tip
 /// that they cannot follow; where the sheet is too large they run into each other.
-const PRICE_BELOW: f64 = 25.0;
+pub(super) const BELOW: f64 = 3.0;
 
 /// The range of λ over a layout.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,6 +98,9 @@ pub struct ScaleSummary {
     pub max_vertex: VertexId,
     /// Part of the surface's area with λ in [1, σ] for the σ asked about.
     pub inside: f64,
+    /// (∫ e² dA)^½ in millimetres, with e how far ln λ lies outside [0, ln σ]: where a patch of radius R asks for e more
+    /// than the sheet has, the sheet misses it by about e · R.
+    pub misfit_mm: f64,
 }
 
 impl ScaleSummary {
@@ -232,6 +235,7 @@ impl Layout {
             max: 0.0,
             max_vertex: VertexId(0),
             inside: 0.0,
+            misfit_mm: 0.0,
         };
         let mut total = 0.0;
         for (face, v) in self.far_from_cones(surface, exclude_mm) {
@@ -247,11 +251,13 @@ impl Layout {
                 self.scale_at(surface, face, [1.0 / 3.0; 3]),
             );
             total += area;
+            summary.misfit_mm += area * excess(scale, sigma).powi(2);
             if (1.0 - 1e-9..=sigma + 1e-9).contains(&scale) {
                 summary.inside += area;
             }
         }
         summary.inside /= f64::max(total, f64::MIN_POSITIVE);
+        summary.misfit_mm = summary.misfit_mm.sqrt();
         summary
     }
 
@@ -268,31 +274,39 @@ impl Layout {
             .filter(move |(_, v)| v.iter().any(far))
     }
 
-    /// The smallest λ of the window [λ, σ λ] that leaves least of the surface outside, the cones' neighbourhoods left
-    /// out, and what is below it counted many times: to shrink is harder for a sheet than to bridge a dent.
+    /// The smallest λ of the window [λ, σ λ] outside which the surface has the least misfit, the cones' neighbourhoods
+    /// left out.
     pub fn best_window(&self, surface: &Surface, exclude_mm: f64, sigma: f64) -> f64 {
-        let mut parts: Vec<(f64, f64)> = self
+        let parts: Vec<(f64, f64)> = self
             .far_from_cones(surface, exclude_mm)
             .map(|(face, v)| {
                 let mean = v.iter().map(|&v| self.log_scale[v]).sum::<f64>() / 3.0;
                 (mean, surface.face_area(face))
             })
             .collect();
-        parts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut best = (f64::INFINITY, 0.0);
-        let (mut below, mut above, mut end) = (0.0, parts.iter().map(|p| p.1).sum::<f64>(), 0);
-        for &(low, area) in &parts {
-            while end < parts.len() && parts[end].0 <= low + sigma.ln() {
-                above -= parts[end].1;
-                end += 1;
+        let width = sigma.ln();
+        // Half the derivative of ∫ e² dA by the window's lower end; it grows, so its zero is found by halving.
+        let slope = |low: f64| -> f64 {
+            let each = |&(x, area): &(f64, f64)| {
+                let (below, above) = ((low - x).max(0.0), (x - low - width).max(0.0));
+                area * (BELOW * BELOW * below - above)
+            };
+            parts.iter().map(each).sum()
+        };
+        let ends = |f: fn(f64, f64) -> f64, start: f64| parts.iter().map(|p| p.0).fold(start, f);
+        let (mut low, mut high) = (
+            ends(f64::min, f64::INFINITY) - width,
+            ends(f64::max, f64::NEG_INFINITY),
+        );
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if slope(middle) > 0.0 {
+                high = middle;
+            } else {
+                low = middle;
             }
-            let price = above + PRICE_BELOW * below;
-            if price < best.0 {
-                best = (price, low);
-            }
-            below += area;
         }
-        best.1.exp()
+        (0.5 * (low + high)).exp()
     }
 
     /// Angle distortion per face: the ratio of the singular values of the flat → surface map, 1 if conformal.
@@ -456,6 +470,11 @@ impl Layout {
             }
         }
     }
+}
+
+/// How far ln λ lies outside [0, ln σ], what is below counted [`BELOW`] times.
+pub(super) fn excess(scale: f64, sigma: f64) -> f64 {
+    (scale / sigma).ln().max(-BELOW * scale.ln()).max(0.0)
 }
 
 #[inline]

@@ -377,6 +377,31 @@ pub(super) struct LinearModel<'s> {
 }
 
 impl MetricSolver<'_> {
+    /// The linear model around a metric that has been found: what its cones and rims add, to first order.
+    pub(super) fn linear_model_at(
+        &mut self,
+        metric: &Metric,
+    ) -> Result<LinearModel<'_>, ConformalError> {
+        let mut u = vec![0.0; self.rows];
+        for (vertex, &row) in self.row.iter_ids() {
+            if row != NONE {
+                u[row as usize] = metric.u[vertex];
+            }
+        }
+        let target = vec![0.0; self.rows];
+        let mut gradient = vec![0.0; self.rows];
+        let mut hessian = vec![0.0; self.cholesky.pattern().entries()];
+        self.evaluate(&u, &target, &mut gradient, &mut hessian);
+        self.factor(&mut hessian)?;
+        Ok(LinearModel {
+            surface: self.surface,
+            row: &self.row,
+            start: metric.u.clone(),
+            cholesky: &mut self.cholesky,
+            rhs: gradient,
+        })
+    }
+
     /// The linear model: one factorisation of the surface's cotangent Laplacian.
     pub(super) fn linear_model(&mut self) -> Result<LinearModel<'_>, ConformalError> {
         let none = Singularities {

@@ -3,12 +3,15 @@
 //! The slit sheet stretches the same in every direction, so a shape that it can take is a conformal image of the flat
 //! sheet with a scale factor λ between 1 (closed) and σ (open); see the paper, §3.1. Room by room: [`MetricSolver`]
 //! finds the scaled edge lengths (CETM) for given [`Singularities`], [`cut_graph`] opens the surface to a disk,
-//! [`Layout`] unfolds the faces and carries λ, [`flatten()`] does all of it, decides on the singularities where they
+//! [`Layout`] unfolds the faces and carries λ, a [`Dart`] leaves
+//! open what no cone can help, [`flatten()`] does all of it, decides on the singularities where they
 //! are left open, and scales.
 
 mod cone;
 mod cut;
+mod dart;
 mod distance;
+mod field;
 mod layout;
 mod metric;
 mod paths;
@@ -17,6 +20,7 @@ mod search;
 
 pub use cone::{CURVATURE_UNIT, Cone, Singularities};
 pub use cut::{Segment, cut_graph};
+pub use dart::{Dart, Patch, around_handles, patches, slit_along, to_goals};
 pub use layout::{Layout, ScaleSummary, Transition};
 pub use metric::{Metric, MetricSolver};
 pub use propose::{
@@ -26,7 +30,7 @@ pub use search::{SearchOptions, search};
 
 use crate::base::progress::Interrupted;
 use crate::base::sparse::FactorError;
-use crate::mesh::VertexId;
+use crate::mesh::{EditError, VertexId};
 
 /// Why a surface could not be flattened.
 #[derive(Debug, thiserror::Error)]
@@ -95,6 +99,12 @@ pub enum ConformalError {
         /// The angle, degrees.
         turn_deg: f64,
     },
+    /// A dart without length.
+    #[error("a dart needs at least two different points: give it as X,Y,Z;X,Y,Z")]
+    DartTooShort,
+    /// A dart that cannot be cut.
+    #[error(transparent)]
+    Dart(EditError),
     /// Newton's method stopped short.
     #[error(
         "the conformal map did not converge: after {steps} steps the angles around vertex {vertex} at ({:.1}, {:.1}, {:.1}) are still {residual_deg:.2e}° off; the mesh has slivers there: remesh it evenly and try again",

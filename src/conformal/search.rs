@@ -1,61 +1,50 @@
 //! The search for singularities: the fewest cones, with their signs and places, and the turnings of the rims, that
 //! bring λ into [1, σ].
 //!
-//! In the smooth theory Δu = K − Σ κᵢ δᵢ is linear in the curvatures of the cones. So the first Newton step of the map
-//! is a model of all maps at once: u ≈ u₀ + Σ κᵢ Gᵢ, with one Green's column Gᵢ for each place where a cone may sit and
-//! one for each rim. The columns of some hundred candidates are computed once and kept at some thousand sample
-//! vertices; after that a set of singularities costs a weighted sum and its price microseconds, so that adding,
-//! removing, moving and changing them one by one, and in pairs, is cheap. The price is the area-weighted square of how
-//! far ln λ lies outside a window of width ln σ, away from the cones, a little for its unevenness inside, and a toll for
-//! each cone. What the search
-//! proposes the full map then confirms. (Compare Li, Liu, et al.: Computing sparse integer-constrained cones for
-//! conformal parameterizations, 2022, which solves a continuous problem first.)
-//!
-//! On a closed surface the units of all cones sum to 3χ. While fewer are placed the rest is spread over the area.
+//! [`Field`] prices a set of singularities in microseconds by a model that is linear in their curvatures, so sets are
+//! changed greedily: a cone is added, removed, moved or strengthened, a rim turned, and, where no single change helps,
+//! a pair of opposite cones added. From the end of such a descent each cone is torn out in turn and the descent repeated
+//! without its place, which leaves most of the local minima behind. The best few sets are then mapped in full, and
+//! there the model is taken anew: right at the set itself, and to first order around it. With it the cones slide over
+//! the mesh to their final places. (Compare Li, Liu, et al.: Computing sparse integer-constrained cones for conformal
+//! parameterizations, 2022, which solves a continuous problem first.)
 
-use nalgebra::Point3;
-
-use super::metric::LinearModel;
+use super::field::{Change, Field, Pricer, Set};
 use super::paths::ShortestPaths;
-use super::{Cone, ConformalError, MetricSolver, Singularities};
+use super::{ConformalError, MetricSolver, Singularities};
 use crate::base::ids::Per;
 use crate::base::progress::Progress;
 use crate::mesh::{Surface, VertexId};
 
 /// What the search needs to know beside the surface.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct SearchOptions {
     /// Largest scale factor that the material allows.
     pub sigma: f64,
     /// About how long a triangle edge is on the surface, millimetres: λ counts only some edges away from the cones.
     pub edge_mm: f64,
+    /// Turnings of the inner rims, if they are not to be searched.
+    pub turnings: Option<Vec<i32>>,
 }
 
 /// Places where a cone may sit.
 const CANDIDATES: usize = 240;
-/// Vertices at which λ is looked at.
-const SAMPLES: usize = 4000;
 /// Cones at the most, beyond those that a closed surface must have.
 const MOST_CONES: usize = 12;
-/// Toll of one cone of +1: worth it if it removes a squared excess of ln λ of this much, averaged over the area (a third
-/// of a percent of the surface off by a factor of e^0.3).
-const TOLL: f64 = 3e-4;
-/// A negative cone costs more: the sheet must be cut through it.
-const TOLL_NEGATIVE: f64 = 6e-4;
-/// Around a cone λ is not looked at, in triangle edges on the surface.
-const CLEARANCE: f64 = 2.0;
 /// Cones closer than this to each other or to a rim, in triangle edges, are not proposed.
 const APART: f64 = 4.0;
-/// How much worse it is to ask the sheet to shrink than to stretch too far.
-const PRICE_BELOW: f64 = 5.0;
-/// Price of unevenness inside the window: decides between sets that all stay inside.
-const UNEVEN: f64 = 0.02;
+/// Strongest cone.
+const MOST_UNITS: i32 = 2;
+/// Descents from a set with one cone torn out, in all.
+const TORN: usize = 12;
+/// Sets that are mapped in full and polished.
+const POLISHED: usize = 2;
 /// Rounds of moving all cones over one distance.
-const ROUNDS: usize = 12;
-/// Room kept below σ and above 1 while searching: the model is not the map, and triangles are not points.
-const MARGIN: f64 = 1.06;
+const ROUNDS: usize = 6;
+/// A change must lower the price by this part, so that rounding cannot keep the search going around.
+const GAIN: f64 = 1e-6;
 
-/// Sets of singularities worth mapping, the best first; the first is what the search ended with, the others what it
+/// Sets of singularities worth mapping, the best first: what the search ended with, the next best ends, and what it
 /// passed on its way.
 ///
 /// # Errors
@@ -66,19 +55,299 @@ pub fn search(
     progress: &dyn Progress,
 ) -> Result<Vec<Singularities>, ConformalError> {
     let surface = solver.surface();
-    let mut model = solver.linear_model()?;
-    let places = candidates(surface, model.start(), options.edge_mm);
-    let mut field = Field::new(surface, &mut model, &places, options, progress)?;
-    let mut found = field.descend(progress)?;
-    field.refine(surface, &mut model, &mut found, progress)?;
+    let mut searcher = Searcher::new(solver, options, progress)?;
+    let (ends, passed) = searcher.explore(progress)?;
     let mut sets: Vec<Singularities> = Vec::new();
-    for set in found.into_iter().rev() {
-        let singularities = field.singularities(&set);
-        if singularities.check(surface).is_ok() && !sets.contains(&singularities) {
-            sets.push(singularities);
+    let mut add = |set: Singularities| {
+        if set.check(surface).is_ok() && !sets.contains(&set) {
+            sets.push(set);
+        }
+    };
+    let mut polished: Vec<(f64, Singularities)> = Vec::new();
+    for end in ends.iter().take(POLISHED) {
+        let set = searcher.field.singularities(end);
+        match polish(solver, &set, options, progress) {
+            Ok(found) => polished.push(found),
+            // Cones on a surface with handles may have no flat metric that closes; the caller hears of it.
+            Err(error @ (ConformalError::Interrupted(_) | ConformalError::Factor(_))) => {
+                return Err(error);
+            }
+            Err(_) => polished.push((f64::INFINITY, set)),
         }
     }
+    polished.sort_by(|a, b| a.0.total_cmp(&b.0));
+    polished.into_iter().for_each(|(_, set)| add(set));
+    for set in ends.iter().skip(POLISHED).chain(passed.iter().rev()) {
+        add(searcher.field.singularities(set));
+    }
     Ok(sets)
+}
+
+/// The model and the rules of the search.
+struct Searcher {
+    field: Field,
+    apart_mm: f64,
+    start: Vec<i32>,
+    /// Whether rims may turn otherwise.
+    free_rims: bool,
+    /// Places that are not to be used for now.
+    banned: Vec<bool>,
+}
+
+impl Searcher {
+    fn new(
+        solver: &mut MetricSolver<'_>,
+        options: &SearchOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self, ConformalError> {
+        let surface = solver.surface();
+        let mut model = solver.linear_model()?;
+        let places = candidates(surface, model.start(), options.edge_mm);
+        let mut field = Field::new(surface, &mut model, options);
+        for &place in &places {
+            progress.check()?;
+            field.place(&mut model, surface, place);
+        }
+        let natural = || Singularities::natural_turnings(surface);
+        Ok(Self {
+            apart_mm: APART * options.edge_mm,
+            start: options.turnings.clone().unwrap_or_else(natural),
+            free_rims: options.turnings.is_none(),
+            banned: vec![false; field.places.len()],
+            field,
+        })
+    }
+
+    /// The ends of all descents, the best first, and the sets that the first descent passed.
+    fn explore(&mut self, progress: &dyn Progress) -> Result<(Vec<Set>, Vec<Set>), ConformalError> {
+        let empty = Set {
+            cones: Vec::new(),
+            turnings: self.start.clone(),
+        };
+        let mut passed = vec![empty.clone()];
+        let first = self.descend(empty, Some(&mut passed), progress)?;
+        let mut ends = vec![first];
+        let mut torn = 0;
+        'best: loop {
+            let (price, best) = ends[0].clone();
+            for i in 0..best.cones.len() {
+                if torn == TORN {
+                    break 'best;
+                }
+                torn += 1;
+                let gone = self.field.places[best.cones[i].0].at;
+                let near = |p: &super::field::Place| (p.at - gone).norm() < self.apart_mm;
+                self.banned = self.field.places.iter().map(near).collect();
+                let other = self.descend(best.changed(Change::Remove { cone: i }), None, progress);
+                self.banned.fill(false);
+                let other = self.descend(other?.1, None, progress)?;
+                if !ends.iter().any(|e| same(&e.1, &other.1)) {
+                    ends.push(other);
+                    ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+                }
+                if ends[0].0 < price * (1.0 - GAIN) {
+                    continue 'best;
+                }
+            }
+            break;
+        }
+        Ok((ends.into_iter().map(|e| e.1).collect(), passed))
+    }
+
+    /// Whether a cone may sit there, beside those of the set but `except`.
+    fn free(&self, set: &Set, place: usize, except: Option<usize>) -> bool {
+        let at = self.field.places[place].at;
+        !self.banned.get(place).is_some_and(|b| *b)
+            && set.cones.iter().enumerate().all(|(i, c)| {
+                Some(i) == except || (self.field.places[c.0].at - at).norm() >= self.apart_mm
+            })
+    }
+
+    /// Greedy descent from a set; every set that was the best for its time goes to `passed`.
+    fn descend(
+        &self,
+        mut best: Set,
+        mut passed: Option<&mut Vec<Set>>,
+        progress: &dyn Progress,
+    ) -> Result<(f64, Set), ConformalError> {
+        let mut price = Pricer::new(&self.field, &best).price();
+        loop {
+            progress.check()?;
+            let must = self.field.missing(&best) != 0;
+            // The best change; one that places curvature that has to be placed is taken at any price.
+            let mut winner: Option<(f64, Change)> = None;
+            let mut pricer = Pricer::new(&self.field, &best);
+            for change in self.changes(&best, must) {
+                let found = pricer.after(change);
+                if found.is_finite() && winner.is_none_or(|(p, _)| found < p) {
+                    winner = Some((found, change));
+                }
+            }
+            match winner {
+                Some((found, change)) if must || found < price * (1.0 - GAIN) => {
+                    (price, best) = (found, best.changed(change));
+                }
+                _ => {
+                    // A pair of opposite cones may help where neither does alone.
+                    let Some(pair) = self.pair(&best, price, progress)? else {
+                        return Ok((price, best));
+                    };
+                    (price, best) = pair;
+                }
+            }
+            if let Some(passed) = &mut passed {
+                passed.push(best.clone());
+            }
+        }
+    }
+
+    /// All single changes; while curvature is missing, only those that place some.
+    fn changes(&self, set: &Set, must: bool) -> Vec<Change> {
+        let mut changes = Vec::new();
+        let missing = self.field.missing(set);
+        let signs: &[i32] = match (self.field.total, missing.signum()) {
+            (None, _) => &[1, -1],
+            (Some(_), 1) => &[1],
+            (Some(_), -1) => &[-1],
+            (Some(_), _) => &[],
+        };
+        for &units in signs {
+            for place in 0..self.field.places.len() {
+                let room = must || set.cones.len() < MOST_CONES;
+                if room && self.free(set, place, None) {
+                    changes.push(Change::Add { place, units });
+                }
+            }
+            for &(place, old) in &set.cones {
+                if (old + units).abs() <= MOST_UNITS && old + units != 0 {
+                    changes.push(Change::Add { place, units });
+                }
+            }
+        }
+        if must {
+            return changes;
+        }
+        for cone in 0..set.cones.len() {
+            if self.field.total.is_none() {
+                changes.push(Change::Remove { cone });
+            }
+            for place in 0..self.field.places.len() {
+                if place != set.cones[cone].0 && self.free(set, place, Some(cone)) {
+                    changes.push(Change::Move { cone, place });
+                }
+            }
+        }
+        if self.free_rims {
+            for rim in 0..set.turnings.len() {
+                changes.extend([-1, 1].map(|units| Change::Turn { rim, units }));
+            }
+        }
+        changes
+    }
+
+    /// The best pair of a positive and a negative cone that lowers the price, if there is one: for each positive one
+    /// in turn the best negative one.
+    fn pair(
+        &self,
+        best: &Set,
+        price: f64,
+        progress: &dyn Progress,
+    ) -> Result<Option<(f64, Set)>, ConformalError> {
+        let toll = self.field.toll(best);
+        if best.cones.len() + 2 > MOST_CONES || price < 4.0 * self.field.least_gain() + toll {
+            return Ok(None);
+        }
+        let places = || 0..self.field.places.len();
+        // The positive ones that do least harm alone.
+        let mut pricer = Pricer::new(&self.field, best);
+        let mut alone: Vec<(f64, usize)> = places()
+            .filter(|&place| self.free(best, place, None))
+            .map(|place| (pricer.after(Change::Add { place, units: 1 }), place))
+            .collect();
+        alone.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut winner: Option<(f64, Set)> = None;
+        for &(_, place) in alone.iter().take(12) {
+            progress.check()?;
+            let half = best.changed(Change::Add { place, units: 1 });
+            let mut pricer = Pricer::new(&self.field, &half);
+            for place in places().filter(|&place| self.free(&half, place, None)) {
+                let change = Change::Add { place, units: -1 };
+                let found = pricer.after(change);
+                if found < winner.as_ref().map_or(price * (1.0 - GAIN), |w| w.0) {
+                    winner = Some((found, half.changed(change)));
+                }
+            }
+        }
+        Ok(winner)
+    }
+}
+
+/// Whether two sets are the same whatever the order of their cones.
+fn same(a: &Set, b: &Set) -> bool {
+    let sorted = |set: &Set| {
+        let mut cones = set.cones.clone();
+        cones.sort_unstable();
+        cones
+    };
+    a.turnings == b.turnings && sorted(a) == sorted(b)
+}
+
+/// Moves the cones of a set over the mesh, ever shorter ways, while that lowers the price around its full map; the
+/// price and the set reached.
+fn polish(
+    solver: &mut MetricSolver<'_>,
+    set: &Singularities,
+    options: &SearchOptions,
+    progress: &dyn Progress,
+) -> Result<(f64, Singularities), ConformalError> {
+    let surface = solver.surface();
+    let metric = solver.solve(set, progress)?;
+    let mut model = solver.linear_model_at(&metric)?;
+    let mut field = Field::new(surface, &mut model, options);
+    let mut best = Set {
+        cones: Vec::new(),
+        turnings: set.turnings.clone(),
+    };
+    for cone in &set.cones {
+        let place = field.place(&mut model, surface, cone.vertex);
+        best.cones.push((place, cone.units));
+    }
+    field.anchor(&best, &metric);
+    let mut price = Pricer::new(&field, &best).price();
+    let spacing = (surface.area() / CANDIDATES as f64).sqrt();
+    let mean =
+        surface.edges().map(|h| surface.length(h)).sum::<f64>() / surface.edges().count() as f64;
+    let mut edges = ((0.5 * spacing / mean).round() as usize).clamp(1, 32);
+    loop {
+        for _ in 0..ROUNDS {
+            let before = price;
+            for cone in 0..best.cones.len() {
+                progress.check()?;
+                let from = field.places[best.cones[cone].0].vertex;
+                for vertex in star(surface, from, edges) {
+                    let place = field.place(&mut model, surface, vertex);
+                    let apart = best.cones.iter().enumerate().all(|(i, c)| {
+                        let gap = (field.places[c.0].at - field.places[place].at).norm();
+                        i == cone || gap >= APART * options.edge_mm
+                    });
+                    let change = Change::Move { cone, place };
+                    if apart && place != best.cones[cone].0 {
+                        let found = Pricer::new(&field, &best).after(change);
+                        if found < price {
+                            (price, best) = (found, best.changed(change));
+                        }
+                    }
+                }
+            }
+            if price >= before * (1.0 - GAIN) {
+                break;
+            }
+        }
+        if edges == 1 {
+            return Ok((price, field.singularities(&best)));
+        }
+        edges /= 2;
+    }
 }
 
 /// Vertices spread evenly over the surface (farthest-point sampling by edge paths, away from the rims), after the
@@ -126,324 +395,6 @@ fn candidates(surface: &Surface, u: &Per<VertexId, f64>, edge_mm: f64) -> Vec<Ve
     chosen
 }
 
-/// A set of singularities by the numbers of their candidates.
-#[derive(Clone, Debug, PartialEq)]
-struct Set {
-    cones: Vec<(usize, i32)>,
-    turnings: Vec<i32>,
-}
-
-/// The model at the sample vertices.
-struct Field {
-    places: Vec<VertexId>,
-    /// Where the candidates are.
-    at: Vec<Point3<f64>>,
-    samples: Vec<VertexId>,
-    positions: Vec<Point3<f64>>,
-    /// Part of the area that each sample stands for.
-    weight: Vec<f64>,
-    /// u without any singularity, the turnings 0.
-    base: Vec<f64>,
-    /// u of one unit at each candidate, sample by sample.
-    columns: Vec<Vec<f64>>,
-    /// u of one unit of turning at each inner rim.
-    rims: Vec<Vec<f64>>,
-    /// u of one unit spread over the area.
-    even: Vec<f64>,
-    /// Units that the cones of a closed surface sum to.
-    total: Option<i32>,
-    start: Vec<i32>,
-    window: f64,
-    clear_mm: f64,
-    apart_mm: f64,
-    /// Scratch: ln λ and weight of the set that is priced.
-    scratch: Vec<(f64, f64)>,
-}
-
-impl Field {
-    fn new(
-        surface: &Surface,
-        model: &mut LinearModel<'_>,
-        places: &[VertexId],
-        options: &SearchOptions,
-        progress: &dyn Progress,
-    ) -> Result<Self, ConformalError> {
-        let count = surface.positions().len();
-        // Scattered over the numbers by the golden ratio: every second vertex may be all of one side.
-        let share = (u64::from(u32::MAX) * SAMPLES as u64 / count as u64) as u32;
-        let chosen = |v: &VertexId| count <= SAMPLES || v.0.wrapping_mul(2_654_435_769) < share;
-        let samples: Vec<VertexId> = surface.positions().ids().filter(chosen).collect();
-        let mut area = Per::<VertexId, f64>::filled(count, 0.0);
-        for (face, v) in surface.faces().iter_ids() {
-            let third = surface.face_area(face) / 3.0;
-            v.iter().for_each(|&v| area[v] += third);
-        }
-        let all: f64 = samples.iter().map(|&v| area[v]).sum();
-        let take = |u: &Per<VertexId, f64>| samples.iter().map(|&v| u[v]).collect::<Vec<f64>>();
-        let base = take(model.start());
-        let even = take(&model.spread(&area));
-        let rims = (1..surface.rims().len())
-            .map(|r| take(&model.rim(r)))
-            .collect();
-        let euler = surface.euler_characteristic() as i32;
-        let mut field = Self {
-            places: Vec::new(),
-            at: Vec::new(),
-            columns: Vec::new(),
-            positions: samples.iter().map(|&v| surface.position(v)).collect(),
-            weight: samples.iter().map(|&v| area[v] / all).collect(),
-            scratch: Vec::with_capacity(samples.len()),
-            samples,
-            base,
-            rims,
-            even,
-            total: surface.rims().is_empty().then_some(3 * euler),
-            start: Singularities::natural_turnings(surface),
-            window: (options.sigma / (MARGIN * MARGIN)).max(1.02).ln(),
-            clear_mm: CLEARANCE * options.edge_mm,
-            apart_mm: APART * options.edge_mm,
-        };
-        for &place in places {
-            progress.check()?;
-            field.place(model, surface, place);
-        }
-        Ok(field)
-    }
-
-    fn singularities(&self, set: &Set) -> Singularities {
-        let cone = |&(place, units): &(usize, i32)| Cone {
-            vertex: self.places[place],
-            units,
-        };
-        Singularities {
-            cones: set.cones.iter().map(cone).collect(),
-            turnings: set.turnings.clone(),
-        }
-    }
-
-    /// Units that are still to be placed.
-    fn missing(&self, set: &Set) -> i32 {
-        let placed: i32 = set.cones.iter().map(|c| c.1).sum();
-        self.total.map_or(0, |total| total - placed)
-    }
-
-    /// Price of a set: its toll and the excess of ln λ at the best shift. Infinite if two cones are too close.
-    fn price(&mut self, set: &Set) -> f64 {
-        for (i, a) in set.cones.iter().enumerate() {
-            for b in &set.cones[..i] {
-                if a.0 == b.0 || (self.at[a.0] - self.at[b.0]).norm() < self.apart_mm {
-                    return f64::INFINITY;
-                }
-            }
-        }
-        let missing = f64::from(self.missing(set));
-        self.scratch.clear();
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for s in 0..self.samples.len() {
-            let near = |c: &(usize, i32)| {
-                (self.at[c.0] - self.positions[s]).norm_squared() < self.clear_mm * self.clear_mm
-            };
-            if set.cones.iter().any(near) {
-                continue;
-            }
-            let mut u = self.base[s] + missing * self.even[s];
-            for &(place, units) in &set.cones {
-                u += f64::from(units) * self.columns[place][s];
-            }
-            for (rim, &turning) in self.rims.iter().zip(&set.turnings) {
-                u += f64::from(turning) * rim[s];
-            }
-            // ln λ = −u.
-            (low, high) = (low.min(-u), high.max(-u));
-            self.scratch.push((-u, self.weight[s]));
-        }
-        if self.scratch.is_empty() {
-            return f64::INFINITY;
-        }
-        // The excess is convex in the window's lower end: halve the interval by its slope.
-        let window = self.window;
-        let slope_and_excess = |start: f64| {
-            let (mut slope, mut excess) = (0.0, 0.0);
-            for &(x, w) in &self.scratch {
-                let (below, above) = ((start - x).max(0.0), (x - start - window).max(0.0));
-                let off = x - start - 0.5 * window;
-                slope += w * (PRICE_BELOW * below - above - UNEVEN * off);
-                excess += w * (PRICE_BELOW * below * below + above * above + UNEVEN * off * off);
-            }
-            (slope, excess)
-        };
-        let (mut a, mut b) = (low, high.max(low + window) - window);
-        for _ in 0..16 {
-            let middle = 0.5 * (a + b);
-            if slope_and_excess(middle).0 > 0.0 {
-                b = middle;
-            } else {
-                a = middle;
-            }
-        }
-        slope_and_excess(0.5 * (a + b)).1 + self.toll(set)
-    }
-
-    /// Greedy descent; every set that was the best for its time, the last one last.
-    fn descend(&mut self, progress: &dyn Progress) -> Result<Vec<Set>, ConformalError> {
-        let mut best = Set {
-            cones: Vec::new(),
-            turnings: self.start.clone(),
-        };
-        let mut price = self.price(&best);
-        let mut passed = vec![best.clone()];
-        loop {
-            progress.check()?;
-            let must = self.missing(&best) != 0;
-            // The best change; one that places curvature that has to be placed is taken at any price.
-            let mut winner: Option<(f64, Set)> = None;
-            let mut offer = |field: &mut Self, set: Set| {
-                let found = field.price(&set);
-                if found.is_finite() && winner.as_ref().is_none_or(|(p, _)| found < *p) {
-                    winner = Some((found, set));
-                }
-            };
-            if must || best.cones.len() < MOST_CONES {
-                let missing = self.missing(&best);
-                let signs: &[i32] = match (self.total, missing.signum()) {
-                    (None, _) => &[1, -1],
-                    (Some(_), 1) => &[1],
-                    (Some(_), -1) => &[-1],
-                    (Some(_), _) => &[],
-                };
-                for &units in signs {
-                    for place in 0..self.places.len() {
-                        let mut set = best.clone();
-                        set.cones.push((place, units));
-                        offer(self, set);
-                    }
-                }
-            }
-            if !must {
-                for i in 0..best.cones.len() {
-                    if self.total.is_none() {
-                        let mut set = best.clone();
-                        set.cones.remove(i);
-                        offer(self, set);
-                    }
-                    for place in 0..self.places.len() {
-                        let mut set = best.clone();
-                        set.cones[i].0 = place;
-                        offer(self, set);
-                    }
-                }
-                for rim in 0..best.turnings.len() {
-                    for step in [-1, 1] {
-                        let mut set = best.clone();
-                        set.turnings[rim] += step;
-                        offer(self, set);
-                    }
-                }
-            }
-            let Some(mut next) = winner else { break };
-            if !must && next.0 >= price * (1.0 - 1e-9) {
-                // A pair of opposite cones may help where neither does alone.
-                let Some(pair) = self.pair(&best, price, progress)? else {
-                    break;
-                };
-                next = pair;
-            }
-            (price, best) = next;
-            passed.push(best.clone());
-        }
-        Ok(passed)
-    }
-
-    /// The best pair of a positive and a negative cone that lowers the price, if there is one: for each positive one
-    /// in turn the best negative one.
-    fn pair(
-        &mut self,
-        best: &Set,
-        price: f64,
-        progress: &dyn Progress,
-    ) -> Result<Option<(f64, Set)>, ConformalError> {
-        if best.cones.len() + 2 > MOST_CONES || price < 4.0 * TOLL + self.toll(best) {
-            return Ok(None);
-        }
-        let mut winner: Option<(f64, Set)> = None;
-        // The positive ones that do least harm alone.
-        let mut alone: Vec<(f64, usize)> = (0..self.places.len())
-            .map(|place| {
-                let mut set = best.clone();
-                set.cones.push((place, 1));
-                (self.price(&set), place)
-            })
-            .collect();
-        alone.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for &(_, positive) in alone.iter().take(12) {
-            progress.check()?;
-            for negative in 0..self.places.len() {
-                let mut set = best.clone();
-                set.cones.extend([(positive, 1), (negative, -1)]);
-                let found = self.price(&set);
-                if found < price * (1.0 - 1e-9) && winner.as_ref().is_none_or(|(p, _)| found < *p) {
-                    winner = Some((found, set));
-                }
-            }
-        }
-        Ok(winner)
-    }
-
-    fn toll(&self, set: &Set) -> f64 {
-        let each = |c: &(usize, i32)| if c.1 > 0 { TOLL } else { TOLL_NEGATIVE };
-        set.cones.iter().map(each).sum()
-    }
-
-    /// Moves the cones of the last set over the mesh, ever shorter ways, while that lowers the price.
-    fn refine(
-        &mut self,
-        surface: &Surface,
-        model: &mut LinearModel<'_>,
-        found: &mut Vec<Set>,
-        progress: &dyn Progress,
-    ) -> Result<(), ConformalError> {
-        let Some(mut best) = found.last().cloned() else {
-            return Ok(());
-        };
-        let mut price = self.price(&best);
-        for edges in [16usize, 8, 4, 2, 1] {
-            for _ in 0..ROUNDS {
-                let before = price;
-                for i in 0..best.cones.len() {
-                    progress.check()?;
-                    let from = self.places[best.cones[i].0];
-                    for vertex in star(surface, from, edges) {
-                        let mut set = best.clone();
-                        set.cones[i].0 = self.place(model, surface, vertex);
-                        let there = self.price(&set);
-                        if there < price {
-                            (best, price) = (set, there);
-                        }
-                    }
-                }
-                if price >= before {
-                    break;
-                }
-            }
-        }
-        found.push(best);
-        Ok(())
-    }
-
-    /// The candidate at a vertex, a new one if need be.
-    fn place(&mut self, model: &mut LinearModel<'_>, surface: &Surface, vertex: VertexId) -> usize {
-        let known = self.places.iter().position(|v| *v == vertex);
-        known.unwrap_or_else(|| {
-            let column = model.cone(vertex);
-            self.columns
-                .push(self.samples.iter().map(|&v| column[v]).collect());
-            self.places.push(vertex);
-            self.at.push(surface.position(vertex));
-            self.places.len() - 1
-        })
-    }
-}
-
 /// Inner vertices `edges` steps straight on from a vertex, along each of its spokes.
 fn star(surface: &Surface, from: VertexId, edges: usize) -> Vec<VertexId> {
     surface
@@ -473,7 +424,11 @@ mod tests {
 
     fn found(sample: &str, sigma: f64, edge_mm: f64) -> (Surface, Vec<Singularities>) {
         let surface = Sample::parse(sample).unwrap().generate().unwrap();
-        let options = SearchOptions { sigma, edge_mm };
+        let options = SearchOptions {
+            sigma,
+            edge_mm,
+            turnings: None,
+        };
         let sets = search(&mut MetricSolver::new(&surface).unwrap(), &options, &Silent).unwrap();
         (surface, sets)
     }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::MakeError;
-use super::request::{ConePlace, ConeWish, Request, Source};
+use super::request::{ConePlace, ConeWish, DartWish, Request, Source};
 use crate::base::document::{Complaint, Document, ranged};
 use crate::conformal::Sizing;
 use crate::linkage::Handedness;
@@ -36,6 +36,9 @@ pub struct Design {
     /// The cones; none if the list is absent.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cone: Vec<ConeChoice>,
+    /// The darts; none if the list is absent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub dart: Vec<DartChoice>,
 }
 
 /// `[surface]`.
@@ -118,6 +121,18 @@ pub struct ConeChoice {
     pub units: i32,
 }
 
+/// `[[dart]]`: an open cut past vertices of the mesh or past points, joined by shortest ways along its edges.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DartChoice {
+    /// Vertices of the imported surface, counted from 1.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub vertices: Vec<u64>,
+    /// Points in millimetres; the nearest points of the surface are taken.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub points_mm: Vec<[f64; 3]>,
+}
+
 #[expect(
     clippy::trivially_copy_pass_by_ref,
     reason = "serde calls it with a reference"
@@ -192,6 +207,18 @@ impl Design {
             0.0,
             100.0,
         )?;
+        for (i, dart) in self.dart.iter().enumerate() {
+            for value in dart.points_mm.iter().flatten() {
+                ranged(&format!("dart[{i}].points_mm"), *value, -1e6, 1e6)?;
+            }
+            let stops = dart.vertices.len().max(dart.points_mm.len());
+            if dart.vertices.is_empty() == dart.points_mm.is_empty() || stops < 2 {
+                return Err(Complaint::new(
+                    format!("dart[{i}]"),
+                    "needs either vertices or points_mm, at least two",
+                ));
+            }
+        }
         for (i, cone) in self.cone.iter().enumerate() {
             for value in cone.at_mm.into_iter().flatten() {
                 ranged(&format!("cone[{i}].at_mm"), value, -1e6, 1e6)?;
@@ -236,6 +263,16 @@ impl Design {
                 (place, c.units)
             })
             .collect();
+        let darts = self
+            .dart
+            .iter()
+            .map(|d| {
+                let by_number = d.vertices.iter().map(|&v| ConePlace::Vertex(v));
+                by_number
+                    .chain(d.points_mm.iter().map(|&p| ConePlace::Point(p)))
+                    .collect()
+            })
+            .collect();
         Request {
             source,
             import: ImportOptions {
@@ -258,6 +295,7 @@ impl Design {
             mirror: self.sheet.mirror,
             sizing: Sizing::EdgeMm(self.linkage.edge_mm),
             cones: ConeWish::Given(cones),
+            darts: DartWish::Given(darts),
             turnings: Some(
                 self.linkage
                     .rim_turnings_deg

@@ -1,13 +1,13 @@
-//! Reading what a request names: the surface, its hash, and the cones as vertices of it.
+//! Reading what a request names: the surface, its hash, and cones and darts by vertices of it.
 
 use nalgebra::Point3;
 use sha2::{Digest as _, Sha256};
 
 use super::MakeError;
-use super::design::ConeChoice;
-use super::request::{ConePlace, ConeWish, Request, Source};
-use crate::conformal::{Cone, vertex_from_number};
-use crate::mesh::{ClosestPoint, Import, Sample, import_bytes, insert_point};
+use super::design::{ConeChoice, DartChoice};
+use super::request::{ConePlace, ConeWish, DartWish, Request, Source};
+use crate::conformal::{Cone, Dart, vertex_from_number};
+use crate::mesh::{ClosestPoint, Import, Sample, Surface, VertexId, import_bytes, insert_point};
 
 /// A surface with the decisions about it.
 pub(crate) struct Loaded {
@@ -19,6 +19,10 @@ pub(crate) struct Loaded {
     pub cones: Option<Vec<Cone>>,
     /// As they will stand in the design file; `None` while the program decides.
     pub cone_choices: Option<Vec<ConeChoice>>,
+    /// Darts; `None` while the program decides.
+    pub darts: Option<Vec<Dart>>,
+    /// As they will stand in the design file; `None` while the program decides.
+    pub dart_choices: Option<Vec<DartChoice>>,
 }
 
 /// Reads the surface, checks its hash, and turns the cones asked for into vertices.
@@ -56,61 +60,96 @@ pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
             )
         }
     };
-    let wished = match &request.cones {
-        ConeWish::Auto => {
-            return Ok(Loaded {
-                import,
-                sha256,
-                cones: None,
-                cone_choices: None,
+    let mut cones = None;
+    let mut cone_choices = None;
+    if let ConeWish::Given(wished) = &request.cones {
+        let (mut list, mut choices) = (Vec::new(), Vec::new());
+        for &(place, units) in wished {
+            let vertex = vertex_at("cone", place, &mut import.surface)?;
+            list.push(Cone { vertex, units });
+            let (number, at_mm) = match place {
+                ConePlace::Vertex(number) => (Some(number), None),
+                ConePlace::Point(at) => (None, Some(at)),
+            };
+            choices.push(ConeChoice {
+                vertex: number,
+                at_mm,
+                units,
             });
         }
-        ConeWish::Given(wished) => wished,
-    };
-    let (mut cones, mut choices) = (Vec::new(), Vec::new());
-    for &(place, units) in wished {
-        match place {
-            ConePlace::Vertex(number) => {
-                let count = import.surface.positions().len();
-                let vertex = vertex_from_number(number)
-                    .filter(|v| (v.0 as usize) < count)
-                    .ok_or(MakeError::NoSuchVertex {
-                        vertex: number,
-                        count,
-                    })?;
-                cones.push(Cone { vertex, units });
-                choices.push(ConeChoice {
-                    vertex: Some(number),
-                    at_mm: None,
-                    units,
-                });
-            }
-            ConePlace::Point(at) => {
-                let found = ClosestPoint::new(&import.surface).query(Point3::from(at));
-                let (low, high) = import.surface.bounds();
-                if found.distance > 0.1 * (high - low).norm() {
-                    return Err(MakeError::ConeFarAway {
-                        at,
-                        distance_mm: found.distance,
-                    });
+        (cones, cone_choices) = (Some(list), Some(choices));
+    }
+    let mut darts = None;
+    let mut dart_choices = None;
+    if let DartWish::Given(wished) = &request.darts {
+        let (mut list, mut choices) = (Vec::new(), Vec::new());
+        for places in wished {
+            let mut stops = Vec::new();
+            let (mut vertices, mut points_mm) = (Vec::new(), Vec::new());
+            for &place in places {
+                stops.push(vertex_at("dart", place, &mut import.surface)?);
+                match place {
+                    ConePlace::Vertex(number) => vertices.push(number),
+                    ConePlace::Point(at) => points_mm.push(at),
                 }
-                let (surface, vertex) =
-                    insert_point(&import.surface, found.face, found.barycentric)
-                        .map_err(MakeError::Edit)?;
-                import.surface = surface;
-                cones.push(Cone { vertex, units });
-                choices.push(ConeChoice {
-                    vertex: None,
-                    at_mm: Some(at),
-                    units,
-                });
             }
+            // A design names one kind only.
+            if !vertices.is_empty() && !points_mm.is_empty() {
+                vertices.clear();
+                points_mm = stops
+                    .iter()
+                    .map(|&v| import.surface.position(v).into())
+                    .collect();
+            }
+            list.push(Dart { stops });
+            choices.push(DartChoice {
+                vertices,
+                points_mm,
+            });
         }
+        (darts, dart_choices) = (Some(list), Some(choices));
     }
     Ok(Loaded {
         import,
         sha256,
-        cones: Some(cones),
-        cone_choices: Some(choices),
+        cones,
+        cone_choices,
+        darts,
+        dart_choices,
     })
+}
+
+/// The vertex at a place, made one if it is none.
+fn vertex_at(
+    what: &'static str,
+    place: ConePlace,
+    surface: &mut Surface,
+) -> Result<VertexId, MakeError> {
+    match place {
+        ConePlace::Vertex(number) => {
+            let count = surface.positions().len();
+            vertex_from_number(number)
+                .filter(|v| (v.0 as usize) < count)
+                .ok_or(MakeError::NoSuchVertex {
+                    what,
+                    vertex: number,
+                    count,
+                })
+        }
+        ConePlace::Point(at) => {
+            let found = ClosestPoint::new(surface).query(Point3::from(at));
+            let (low, high) = surface.bounds();
+            if found.distance > 0.1 * (high - low).norm() {
+                return Err(MakeError::FarAway {
+                    what,
+                    at,
+                    distance_mm: found.distance,
+                });
+            }
+            let (changed, vertex) =
+                insert_point(surface, found.face, found.barycentric).map_err(MakeError::Edit)?;
+            *surface = changed;
+            Ok(vertex)
+        }
+    }
 }

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::cut::{CutResult, cut};
 use super::design::{
-    ConeChoice, Design, FORMAT, LinkageChoice, SheetChoice, SolveChoice, SurfaceChoice,
+    ConeChoice, DartChoice, Design, FORMAT, LinkageChoice, SheetChoice, SolveChoice, SurfaceChoice,
 };
 use super::load::{Loaded, load};
 use super::report::{self, Page, Stroke};
@@ -21,7 +21,7 @@ use super::verdict::{Reason, Verdict};
 use super::{MakeError, tell};
 use crate::base::atomic;
 use crate::base::progress::Progress;
-use crate::conformal::{Cone, Sizing};
+use crate::conformal::{Cone, Dart, Sizing};
 use crate::linkage::write_obj;
 use crate::mesh::{ClosestPoint, PartChoice, write};
 use crate::pattern;
@@ -126,7 +126,7 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         verdict: &shape.verdict,
         summary: &summary,
         warnings: &warnings,
-        surface,
+        surface: &shape.ground.surface,
         layout: &shape.flat.layout,
         linkage: &shape.linkage,
         positions: &shape.positions,
@@ -193,6 +193,10 @@ fn decided(
         at_mm: None,
         units: c.units,
     };
+    let opened = |d: &Dart| DartChoice {
+        vertices: d.stops.iter().map(|v| u64::from(v.0) + 1).collect(),
+        points_mm: Vec::new(),
+    };
     Design {
         format: FORMAT,
         surface: SurfaceChoice {
@@ -225,6 +229,10 @@ fn decided(
             .cone_choices
             .clone()
             .unwrap_or_else(|| shape.flat.layout.cones.iter().map(found).collect()),
+        dart: loaded
+            .dart_choices
+            .clone()
+            .unwrap_or_else(|| shape.ground.darts.iter().map(opened).collect()),
     }
 }
 

@@ -8,6 +8,7 @@ mod cut;
 mod design;
 mod load;
 mod make;
+mod maps;
 pub mod picture;
 pub mod report;
 mod request;
@@ -17,9 +18,13 @@ mod verdict;
 
 use std::path::PathBuf;
 
-pub use design::{ConeChoice, Design, LinkageChoice, SheetChoice, SolveChoice, SurfaceChoice};
+pub use design::{
+    ConeChoice, DartChoice, Design, LinkageChoice, SheetChoice, SolveChoice, SurfaceChoice,
+};
 pub use make::{FILES, Made, make};
-pub use request::{ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, Request, Source};
+pub use request::{
+    ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, Request, Source,
+};
 pub use verdict::{COVERAGE_WANTED, EDGE_TOLERANCE, Reason, Verdict};
 
 use crate::base::catalog::CatalogError;
@@ -80,19 +85,23 @@ pub enum MakeError {
         most: f64,
     },
     /// A cone at a vertex that does not exist.
-    #[error("--cone v{vertex}: there is no such vertex, the surface has v1 to v{count}")]
+    #[error("--{what} v{vertex}: there is no such vertex, the surface has v1 to v{count}")]
     NoSuchVertex {
+        /// What was to be there: cone or dart.
+        what: &'static str,
         /// As given.
         vertex: u64,
         /// Vertices there are.
         count: usize,
     },
-    /// A cone at a point far from the surface.
+    /// A cone or a dart at a point far from the surface.
     #[error(
-        "--cone {},{},{}: the surface is {distance_mm:.1} mm away from there; coordinates are millimetres after --unit, --scale and --size (see `kagome inspect`)",
+        "--{what} {},{},{}: the surface is {distance_mm:.1} mm away from there; coordinates are millimetres after --unit, --scale and --size (see `kagome inspect`)",
         at[0], at[1], at[2]
     )]
-    ConeFarAway {
+    FarAway {
+        /// What was to be there: cone or dart.
+        what: &'static str,
         /// As given.
         at: [f64; 3],
         /// Distance from the surface.

@@ -21,7 +21,7 @@ pub enum Source {
     Sample(String),
 }
 
-/// Where a cone is wanted.
+/// Where a cone is wanted, or a dart passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ConePlace {
     /// At a vertex, counted from 1.
@@ -38,6 +38,16 @@ pub enum ConeWish {
     Auto,
     /// Exactly these, with their curvature in units of 2π/3.
     Given(Vec<(ConePlace, i32)>),
+}
+
+/// Which darts are wanted: open cuts that take up what no cone can.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum DartWish {
+    /// As few as needed, if cones are left to the program too.
+    #[default]
+    Auto,
+    /// Exactly these, each by the places that it passes, joined by shortest ways.
+    Given(Vec<Vec<ConePlace>>),
 }
 
 /// Everything that `make` needs.
@@ -63,6 +73,8 @@ pub struct Request {
     pub sizing: Sizing,
     /// Cones.
     pub cones: ConeWish,
+    /// Darts.
+    pub darts: DartWish,
     /// Turning of each rim but the first in units of 120°; `None`: what needs least stretch.
     pub turnings: Option<Vec<i32>>,
     /// Lattice direction, degrees; `None`: what fits the seams.
@@ -94,6 +106,7 @@ impl Request {
             mirror: false,
             sizing: Sizing::Triangles(DEFAULT_TRIANGLES),
             cones: ConeWish::Auto,
+            darts: DartWish::Auto,
             turnings: None,
             orientation_deg: None,
             handedness: Handedness::Right,

@@ -1,19 +1,22 @@
-//! From a surface to a judged linkage with its flat sheet in place on the bed.
+//! From a request to a judged linkage with its flat sheet in place on the bed.
 //!
-//! Cheap steps first: map, linkage and sheet show whether the request can work at all before the long solve. Where
-//! the number of triangles to remove at a cone is left open, more are removed only if fewer do not do.
+//! Cheap steps first: map, linkage and sheet show whether the request can work at all before the long solve. The maps
+//! come from [`maps`], the most promising first; where cones are left to the program and none of them is within reach,
+//! the surface is opened by a dart where it is worst, and mapped again.
+
+use std::sync::Arc;
 
 use nalgebra::{Point2, Point3};
 
 use super::MakeError;
 use super::load::Loaded;
+use super::maps::{Ground, Map, maps};
 use super::request::{ConeWish, Request};
 use super::verdict::{Verdict, place};
 use crate::base::progress::Progress;
 use crate::base::units::short;
 use crate::conformal::{
-    Cone, ConformalError, FlattenOptions, Flattened, MetricSolver, SearchOptions, Singularities,
-    Sizing, choose_turnings, search,
+    ConformalError, Dart, FlattenOptions, Flattened, Sizing, around_handles, patches, to_goals,
 };
 use crate::linkage::{Built, Linkage, LinkageOptions, build, fit};
 use crate::machine::Machine;
@@ -35,6 +38,8 @@ pub(crate) struct Stock<'a> {
 
 /// A linkage solved and judged, and its sheet.
 pub(crate) struct Shape {
+    /// The surface as it was mapped, and its darts.
+    pub ground: Arc<Ground>,
     /// The map.
     pub flat: Flattened,
     /// The linkage as it was laid, before it was moved to its place on the bed.
@@ -61,16 +66,15 @@ pub(crate) struct Shape {
     pub verdict: Verdict,
 }
 
-/// Triangles around a positive cone that are tried in turn unless a number is given: those at it, then those and the
-/// next ring. λ falls to 0 at such a cone, and the finer the triangles, the deeper they reach into the fall.
-const REMOVALS: [usize; 2] = [4, 16];
-
-/// Sets of singularities that the search proposes and that are mapped.
-const MAPPED: usize = 6;
-/// Maps on which a linkage is tried, until one passes.
+/// Linkages tried on one surface before it gets another dart, and in all once there is nothing more to open.
 const TRIED: usize = 4;
+/// Darts at the most that the program opens by itself, beside those that open handles.
+const MOST_DARTS: usize = 8;
+/// While there are darts to try, a map is laid out only if its misfit is smaller, in L: the sheet then misses the
+/// surface by about a third of that.
+const PROMISING: f64 = 0.7;
 
-/// Finds the shape: the first number of removed triangles that passes, else the one that comes closest.
+/// Finds the shape: the first map that passes, with as few darts as possible, else the one that comes closest.
 pub(crate) fn shape(
     request: &Request,
     loaded: &Loaded,
@@ -78,156 +82,150 @@ pub(crate) fn shape(
     closest: &ClosestPoint,
     progress: &dyn Progress,
 ) -> Result<Shape, MakeError> {
-    let mut best: Option<Shape> = None;
-    let mut refused: Option<MakeError> = None;
-    for map in maps(request, loaded, stock.sigma, progress)? {
-        let surface = &loaded.import.surface;
-        let shape = match attempt(request, surface, map, stock, closest, progress) {
+    let original = &loaded.import.surface;
+    let mut darts = loaded.darts.clone().unwrap_or_default();
+    let mut free =
+        loaded.darts.is_none() && request.cones == ConeWish::Auto && request.turnings.is_none();
+    let mut tries = Tries::default();
+    let opened = darts.len();
+    loop {
+        let ground = Arc::new(Ground::new(original, &darts).map_err(MakeError::Conformal)?);
+        free &= darts.len() < opened + MOST_DARTS;
+        let found = match maps(
+            request,
+            loaded.cones.as_deref(),
+            &ground,
+            stock.sigma,
+            progress,
+        ) {
+            Err(MakeError::Conformal(
+                error @ (ConformalError::Holonomy { .. } | ConformalError::TotalCurvature { .. }),
+            )) if free && ground.surface.genus() > 0 => {
+                // The pattern does not close around the handles.
+                darts.extend(around_handles(original).map_err(MakeError::Conformal)?);
+                progress.note(&format!("the handles are cut open: {error}"));
+                continue;
+            }
+            found => found?,
+        };
+        let next = match found.first() {
+            Some(map) if free => dart_for(original, map, stock.sigma)?,
+            _ => None,
+        };
+        for map in found {
+            let promising = map.flat.scale.misfit_mm < PROMISING * map.flat.edge_mm;
+            if tries.on(&ground) >= TRIED || next.is_some() && !promising {
+                tries.waiting.push(map);
+            } else if let Some(shape) = tries.attempt(request, map, stock, closest, progress)? {
+                return Ok(shape);
+            }
+        }
+        let Some(dart) = next else { break };
+        let at = original.position(dart.stops[0]);
+        progress.note(&format!(
+            "no cones suffice: a dart is opened at {}",
+            place(at)
+        ));
+        darts.push(dart);
+    }
+    // Nothing passed. The most promising of what was left for later, for the best answer to give.
+    let mut waiting = std::mem::take(&mut tries.waiting);
+    waiting.sort_by(|a, b| a.misfit().total_cmp(&b.misfit()));
+    for map in waiting.into_iter().take(TRIED.saturating_sub(tries.count)) {
+        if let Some(shape) = tries.attempt(request, map, stock, closest, progress)? {
+            return Ok(shape);
+        }
+    }
+    let nothing = || MakeError::Internal("no layout was tried".into());
+    tries
+        .best
+        .ok_or_else(|| tries.refused.unwrap_or_else(nothing))
+}
+
+/// The dart that takes up what a map misses most: from where λ is farthest outside to the nearest opening, on a surface
+/// without one to the next such place.
+fn dart_for(original: &Surface, map: &Map, sigma: f64) -> Result<Option<Dart>, MakeError> {
+    let surface = &map.ground.surface;
+    let exclude_mm = map.options.cone_clearance * map.flat.edge_mm;
+    let patches = patches(surface, &map.flat.layout, exclude_mm, sigma);
+    let count = original.positions().len();
+    let known = |v: &crate::mesh::VertexId| (v.0 as usize) < count;
+    let mut peaks = patches.iter().map(|p| p.peak).filter(known);
+    let Some(from) = peaks.next() else {
+        return Ok(None);
+    };
+    let closed = surface.rims().is_empty();
+    let goals: Vec<_> = if closed {
+        peaks.take(1).collect()
+    } else {
+        Vec::new()
+    };
+    to_goals(original, &map.ground.darts, from, &goals).map_err(MakeError::Conformal)
+}
+
+/// What was tried so far.
+#[derive(Default)]
+struct Tries {
+    count: usize,
+    /// Tried on the surface of that many darts.
+    here: (usize, usize),
+    waiting: Vec<Map>,
+    best: Option<Shape>,
+    refused: Option<MakeError>,
+}
+
+impl Tries {
+    /// How many were tried on this surface.
+    fn on(&mut self, ground: &Ground) -> usize {
+        if self.here.0 != ground.darts.len() {
+            self.here = (ground.darts.len(), 0);
+        }
+        self.here.1
+    }
+
+    /// Tries a map; the shape if it passes.
+    fn attempt(
+        &mut self,
+        request: &Request,
+        map: Map,
+        stock: &Stock<'_>,
+        closest: &ClosestPoint,
+        progress: &dyn Progress,
+    ) -> Result<Option<Shape>, MakeError> {
+        self.count += 1;
+        self.here.1 += 1;
+        let shape = match attempt(request, map, stock, closest, progress) {
             Ok(shape) => shape,
             // A map may ask for triangles that are too small for the hinges, or for too many, where another does not.
             Err(error @ (MakeError::Pattern(_) | MakeError::Linkage(_)))
                 if progress.check().is_ok() =>
             {
-                refused = refused.or(Some(error));
-                continue;
+                self.refused.get_or_insert(error);
+                return Ok(None);
             }
             Err(error) => return Err(error),
         };
         if shape.verdict.pass {
-            return Ok(shape);
+            return Ok(Some(shape));
         }
         let nearer =
             |old: &Shape| shape.quality.distance_max.value < old.quality.distance_max.value;
-        if best.as_ref().is_none_or(nearer) {
-            best = Some(shape);
+        if self.best.as_ref().is_none_or(nearer) {
+            self.best = Some(shape);
         }
+        Ok(None)
     }
-    best.ok_or_else(|| refused.unwrap_or_else(|| MakeError::Internal("no layout was tried".into())))
-}
-
-/// A map with the options that made it and the number of triangles to remove.
-struct Map {
-    flat: Flattened,
-    options: FlattenOptions,
-    removal: usize,
-}
-
-/// The maps worth trying, the most promising first. With cones left to the program: without one, and, if that leaves
-/// [1, σ], with what is proposed instead; with the number of triangles to remove left open: each of [`REMOVALS`].
-fn maps(
-    request: &Request,
-    loaded: &Loaded,
-    sigma: f64,
-    progress: &dyn Progress,
-) -> Result<Vec<Map>, MakeError> {
-    let surface = &loaded.import.surface;
-    let mut solver = MetricSolver::new(surface).map_err(MakeError::Conformal)?;
-    let options = |removal: usize| FlattenOptions {
-        sigma,
-        sizing: request.sizing,
-        cone_clearance: clearance(removal),
-    };
-    let removals = |cones: &[Cone]| match request.remove_at_cone {
-        _ if cones.iter().all(|c| c.units <= 0) => vec![0],
-        Some(count) => vec![count],
-        None => REMOVALS.to_vec(),
-    };
-    let resized = |flat: Flattened| -> Vec<Map> {
-        let map = |removal: usize| Map {
-            flat: flat.clone().resize(surface, &options(removal)),
-            options: options(removal),
-            removal,
-        };
-        removals(&flat.layout.cones).into_iter().map(map).collect()
-    };
-    // With the turnings of the rims as asked for, or those that suit these cones best.
-    let mut with_cones = |cones: &[Cone]| -> Result<Vec<Map>, ConformalError> {
-        progress.start("conformal map", None);
-        let first = options(removals(cones)[0]);
-        let flat = match &request.turnings {
-            Some(turnings) => {
-                let given = Singularities {
-                    cones: cones.to_vec(),
-                    turnings: turnings.clone(),
-                };
-                Flattened::solve(&mut solver, &given, &first, progress)
-            }
-            None => choose_turnings(&mut solver, cones, &first, progress),
-        };
-        flat.map(resized)
-    };
-    let mut maps = match &loaded.cones {
-        Some(cones) => with_cones(cones).map_err(MakeError::Conformal)?,
-        None => {
-            let mut refused = None;
-            let mut maps = match with_cones(&[]) {
-                // A closed surface may need cones.
-                Err(error @ ConformalError::TotalCurvature { .. }) => {
-                    refused = Some(error);
-                    Vec::new()
-                }
-                plain => plain.map_err(MakeError::Conformal)?,
-            };
-            if maps.first().is_some_and(|m| m.flat.scale.within(sigma)) {
-                return Ok(maps);
-            }
-            // The obvious cone; the search may find a better one, or that none is worth its price.
-            let obvious = maps
-                .first()
-                .and_then(|m| m.flat.proposed_cone(surface, sigma));
-            if let Some(cone) = obvious {
-                maps.extend(with_cones(&[cone]).map_err(MakeError::Conformal)?);
-            }
-            progress.start("searching for cones", None);
-            let edge_mm = match request.sizing {
-                Sizing::EdgeMm(edge) => edge,
-                // Half of a surface is about as much as its sheet.
-                Sizing::Triangles(count) => (surface.area() / (2.0 * count * 0.433)).sqrt(),
-            };
-            let wish = SearchOptions { sigma, edge_mm };
-            let sets = search(&mut solver, &wish, progress).map_err(MakeError::Conformal)?;
-            let known: Vec<Singularities> =
-                maps.iter().map(|m| m.flat.singularities.clone()).collect();
-            for set in sets.into_iter().filter(|s| !known.contains(s)).take(MAPPED) {
-                let first = options(removals(&set.cones)[0]);
-                match Flattened::solve(&mut solver, &set, &first, progress) {
-                    Ok(flat) => maps.extend(resized(flat)),
-                    // Cones on a surface with handles rarely close around them.
-                    Err(
-                        error @ (ConformalError::Holonomy { .. }
-                        | ConformalError::NotConverged { .. }),
-                    ) => refused = Some(error),
-                    Err(error) => return Err(MakeError::Conformal(error)),
-                }
-            }
-            if let Some(error) = refused.filter(|_| maps.is_empty()) {
-                return Err(MakeError::Conformal(error));
-            }
-            maps
-        }
-    };
-    // A map within [1, σ] comes first, the one that removes least of those; else the one that leaves least of the
-    // surface outside. The sort is stable.
-    let outside = |map: &Map| {
-        if map.flat.scale.within(sigma) {
-            0.0
-        } else {
-            1.0 - map.flat.scale.inside
-        }
-    };
-    maps.sort_by(|a, b| outside(a).total_cmp(&outside(b)));
-    maps.truncate(TRIED);
-    Ok(maps)
 }
 
 fn attempt(
     request: &Request,
-    surface: &Surface,
     map: Map,
     stock: &Stock<'_>,
     closest: &ClosestPoint,
     progress: &dyn Progress,
 ) -> Result<Shape, MakeError> {
+    let ground = Arc::clone(&map.ground);
+    let surface = &ground.surface;
     let Laid {
         flat,
         built,
@@ -278,6 +276,7 @@ fn attempt(
         request.cones == ConeWish::Auto,
     );
     Ok(Shape {
+        ground: Arc::clone(&ground),
         flat,
         built,
         removed: map.removal,
@@ -358,17 +357,6 @@ fn lay_out(
             let got = lay(map.flat.clone(), false)?.built.linkage.triangles.len() as f64;
             lay(resized(Sizing::Triangles(wanted * wanted / got)), false)
         }
-    }
-}
-
-/// Radius around a cone, in L, that no triangle's centre comes within: 1/√3 with all triangles in place, 2/√3 without
-/// the four at the cone, 2 rings without sixteen; taken a little smaller for the second and third because corners
-/// reach further in than centres.
-fn clearance(removal: usize) -> f64 {
-    if removal == 0 {
-        0.7
-    } else {
-        (removal as f64 / 4.0).sqrt().floor().max(1.0) + 0.1
     }
 }
 

@@ -66,6 +66,17 @@ pub(crate) fn warnings(
             }
         ));
     }
+    for dart in &shape.ground.darts {
+        let at = |v: crate::mesh::VertexId| super::verdict::place(shape.ground.surface.position(v));
+        let ends = dart.stops.first().zip(dart.stops.last());
+        warnings.push(match ends {
+            Some((a, b)) if a != b => format!(
+                "there is an open cut (a dart) from {} to {}: the pattern does not go on across it, and its sides are only laid together",
+                at(*a), at(*b)
+            ),
+            _ => "there is an open cut around a handle: the pattern does not go on across it, and its sides are only laid together".to_owned(),
+        });
+    }
     if built.pieces > 1 {
         warnings.push(format!(
             "the sheet is cut in {} pieces, because around a cone of negative curvature there is more than lies flat: join them along their seams",
@@ -180,7 +191,7 @@ pub(crate) fn figures(
     warnings: &[String],
 ) -> Value {
     let (flat, built) = (&shape.flat, &shape.built);
-    let surface = &loaded.import.surface;
+    let surface = &shape.ground.surface;
     let mut distortion = flat.layout.quasi_conformal_error(surface).into_vec();
     distortion.sort_by(f64::total_cmp);
     let at = |part: f64| {

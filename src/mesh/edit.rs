@@ -1,4 +1,4 @@
-//! Making a given point of a surface one of its vertices: a cone can only stand at a vertex.
+//! Changing a surface where a design asks for it: a point made a vertex, because a cone can only stand at one, and slits.
 
 use super::surface::{FaceId, HalfedgeId, Surface, TopologyError, VertexId};
 use crate::base::ids::Id as _;
@@ -30,6 +30,58 @@ pub enum EditError {
     /// The result is not a surface, which means that the input had degenerate faces.
     #[error("the face cannot be split there: {0}")]
     Topology(#[from] TopologyError),
+    /// A slit that cuts a piece off.
+    #[error(
+        "slit there the surface falls into {parts} parts: a dart must end inside it, or at another rim"
+    )]
+    FallsApart {
+        /// Parts that would be left.
+        parts: usize,
+    },
+}
+
+/// The surface cut open along the given edges: their two sides become rims. Faces keep their ids, and so does one copy
+/// of every vertex; its other copies are appended, at the same place. A slit that begins at a rim makes that rim longer,
+/// one inside the surface is a rim of its own. An edge on a rim is open already.
+///
+/// # Errors
+/// [`EditError::FallsApart`] if the surface were no longer in one part.
+pub fn slit(surface: &Surface, edges: &[HalfedgeId]) -> Result<Surface, EditError> {
+    let mut open = vec![false; 3 * surface.faces().len()];
+    for &h in edges {
+        open[h.index()] = true;
+        if let Some(twin) = surface.twin(h) {
+            open[twin.index()] = true;
+        }
+    }
+    let (mut positions, mut faces) = surface.to_arrays();
+    for vertex in surface.positions().ids() {
+        let fan: Vec<HalfedgeId> = surface.around(vertex).collect();
+        let cuts = fan.iter().filter(|h| open[h.index()]).count();
+        if cuts == 0 {
+            continue;
+        }
+        // At a rim the fan begins on it; elsewhere begin behind a cut, so that no wedge is split by the start of the turn.
+        let start = if surface.on_rim(vertex) {
+            0
+        } else {
+            fan.iter().position(|h| open[h.index()]).unwrap_or(0)
+        };
+        let mut name = vertex.0;
+        for i in 0..fan.len() {
+            let h = fan[(start + i) % fan.len()];
+            if i > 0 && open[h.index()] {
+                name = positions.len() as u32;
+                positions.push(surface.position(vertex));
+            }
+            faces[h.face().index()][h.corner()] = name;
+        }
+    }
+    let slit = Surface::new(positions, faces)?;
+    match slit.parts().len() {
+        1 => Ok(slit),
+        parts => Err(EditError::FallsApart { parts }),
+    }
 }
 
 /// A surface that has a vertex at the point of `face` with these barycentric weights, and that vertex.
@@ -124,6 +176,42 @@ mod tests {
             .unwrap()
             .generate()
             .unwrap()
+    }
+
+    /// V − E + F of a disk with `slits` inside is 1 − slits; faces stay as they were.
+    #[test]
+    fn a_slit_lengthens_its_rim_or_is_one_of_its_own() {
+        let disk = surface("cap");
+        let rim = disk.rims()[0].clone();
+        // Straight in from the rim, over three edges.
+        let spoke = |v: VertexId| disk.around(v).nth(1).unwrap();
+        let mut path = vec![spoke(rim[0])];
+        while path.len() < 3 {
+            let here = disk.head(*path.last().unwrap());
+            let fan: Vec<HalfedgeId> = disk.around(here).collect();
+            let back = fan
+                .iter()
+                .position(|h| disk.twin(*h) == path.last().copied());
+            path.push(fan[(back.unwrap() + fan.len() / 2) % fan.len()]);
+        }
+        let open = slit(&disk, &path).unwrap();
+        assert_eq!((open.rims().len(), open.euler_characteristic()), (1, 1));
+        assert_eq!(open.rims()[0].len(), rim.len() + 6);
+        assert_eq!(open.positions().len(), disk.positions().len() + 3);
+        let inner = slit(&disk, &path[1..]).unwrap();
+        assert_eq!((inner.rims().len(), inner.euler_characteristic()), (2, 0));
+        for (face, corners) in disk.faces().iter_ids() {
+            assert_eq!(open.corners(face), corners.map(|v| disk.position(v)));
+        }
+        assert_eq!(slit(&disk, &[]).unwrap().to_arrays(), disk.to_arrays());
+        let around: Vec<HalfedgeId> = disk
+            .around(path.last().map(|h| disk.head(*h)).unwrap())
+            .map(HalfedgeId::next)
+            .collect();
+        assert_eq!(
+            slit(&disk, &around).unwrap_err(),
+            EditError::FallsApart { parts: 2 }
+        );
     }
 
     #[test]

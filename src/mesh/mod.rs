@@ -3,7 +3,7 @@
 //! - [`read`]: OBJ, STL and PLY as triangles, with the line of what cannot be read;
 //! - [`repair`]: triangles into a surface: mended where that needs no guess, refused with place and remedy elsewhere;
 //! - [`samples`]: surfaces made here, by name;
-//! - [`closest`]: the closest point on a surface; [`edit`]: a point made a vertex;
+//! - [`closest`]: the closest point on a surface; [`edit`]: a point made a vertex, slits;
 //! - [`check`]: figures for people; [`mod@write`]: OBJ text.
 //!
 //! ```
@@ -27,7 +27,7 @@ pub mod units;
 pub mod write;
 
 pub use closest::{Closest, ClosestPoint, Feature, distance_to_triangle};
-pub use edit::insert_point;
+pub use edit::{EditError, insert_point, slit};
 pub use error::{ImportError, Problem};
 pub use repair::{Import, ImportOptions, ImportReport, PartChoice, import_bytes, import_file};
 pub use samples::{Sample, SampleError};

@@ -1,0 +1,175 @@
+//! The conformal maps that a linkage is tried on: with the singularities that were asked for, or those that the program
+//! proposes, on the surface with its darts open.
+
+use std::sync::Arc;
+
+use super::MakeError;
+use super::request::Request;
+use crate::base::progress::Progress;
+use crate::conformal::{
+    Cone, ConformalError, Dart, FlattenOptions, Flattened, MetricSolver, SearchOptions,
+    Singularities, Sizing, choose_turnings, search, slit_along,
+};
+use crate::mesh::Surface;
+
+/// Triangles around a positive cone that are tried in turn unless a number is given: those at it, then those and the
+/// next ring. λ falls to 0 at such a cone, and the finer the triangles, the deeper they reach into the fall.
+const REMOVALS: [usize; 2] = [4, 16];
+
+/// Sets of singularities that the search proposes and that are mapped.
+const MAPPED: usize = 6;
+/// The surface as it is mapped.
+#[derive(Debug)]
+pub(crate) struct Ground {
+    /// Slit along the darts. Faces and one copy of each vertex have the ids that they have on the surface itself.
+    pub surface: Surface,
+    /// The darts, by vertices of the surface itself.
+    pub darts: Vec<Dart>,
+}
+
+impl Ground {
+    /// A surface with its darts open.
+    ///
+    /// # Errors
+    /// [`slit_along`].
+    pub fn new(surface: &Surface, darts: &[Dart]) -> Result<Self, ConformalError> {
+        let darts = darts.to_vec();
+        let surface = if darts.is_empty() {
+            surface.clone()
+        } else {
+            slit_along(surface, &darts)?
+        };
+        Ok(Self { surface, darts })
+    }
+}
+
+/// A map with the options that made it and the number of triangles to remove.
+pub(crate) struct Map {
+    pub ground: Arc<Ground>,
+    pub flat: Flattened,
+    pub options: FlattenOptions,
+    pub removal: usize,
+}
+
+impl Map {
+    /// What the map asks for beyond the sheet, in L; 0 where σ suffices.
+    pub fn misfit(&self) -> f64 {
+        self.flat.scale.misfit_mm / self.flat.edge_mm
+    }
+}
+
+/// The maps worth trying, the most promising first. With cones left to the program: without one, and, if that leaves
+/// [1, σ], with what is proposed instead; with the number of triangles to remove left open: each of [`REMOVALS`].
+pub(crate) fn maps(
+    request: &Request,
+    given: Option<&[Cone]>,
+    ground: &Arc<Ground>,
+    sigma: f64,
+    progress: &dyn Progress,
+) -> Result<Vec<Map>, MakeError> {
+    let surface = &ground.surface;
+    let mut solver = MetricSolver::new(surface).map_err(MakeError::Conformal)?;
+    let options = |removal: usize| FlattenOptions {
+        sigma,
+        sizing: request.sizing,
+        cone_clearance: clearance(removal),
+    };
+    let removals = |cones: &[Cone]| match request.remove_at_cone {
+        _ if cones.iter().all(|c| c.units <= 0) => vec![0],
+        Some(count) => vec![count],
+        None => REMOVALS.to_vec(),
+    };
+    let resized = |flat: Flattened| -> Vec<Map> {
+        let map = |removal: usize| Map {
+            flat: flat.clone().resize(surface, &options(removal)),
+            options: options(removal),
+            removal,
+            ground: Arc::clone(ground),
+        };
+        removals(&flat.layout.cones).into_iter().map(map).collect()
+    };
+    // With the turnings of the rims as asked for, or those that suit these cones best.
+    let mut with_cones = |cones: &[Cone]| -> Result<Vec<Map>, ConformalError> {
+        progress.start("conformal map", None);
+        let first = options(removals(cones)[0]);
+        let flat = match &request.turnings {
+            Some(turnings) => {
+                let given = Singularities {
+                    cones: cones.to_vec(),
+                    turnings: turnings.clone(),
+                };
+                Flattened::solve(&mut solver, &given, &first, progress)
+            }
+            None => choose_turnings(&mut solver, cones, &first, progress),
+        };
+        flat.map(resized)
+    };
+    let mut maps = match given {
+        Some(cones) => with_cones(cones).map_err(MakeError::Conformal)?,
+        None => {
+            let mut refused = None;
+            let mut maps = match with_cones(&[]) {
+                // A closed surface may need cones.
+                Err(error @ ConformalError::TotalCurvature { .. }) => {
+                    refused = Some(error);
+                    Vec::new()
+                }
+                plain => plain.map_err(MakeError::Conformal)?,
+            };
+            if maps.first().is_some_and(|m| m.flat.scale.within(sigma)) {
+                return Ok(maps);
+            }
+            // The obvious cone; the search may find a better one, or that none is worth its price.
+            let obvious = maps
+                .first()
+                .and_then(|m| m.flat.proposed_cone(surface, sigma));
+            if let Some(cone) = obvious {
+                maps.extend(with_cones(&[cone]).map_err(MakeError::Conformal)?);
+            }
+            progress.start("searching for cones", None);
+            let edge_mm = match request.sizing {
+                Sizing::EdgeMm(edge) => edge,
+                // Half of a surface is about as much as its sheet.
+                Sizing::Triangles(count) => (surface.area() / (2.0 * count * 0.433)).sqrt(),
+            };
+            let wish = SearchOptions {
+                sigma,
+                edge_mm,
+                turnings: request.turnings.clone(),
+            };
+            let sets = search(&mut solver, &wish, progress).map_err(MakeError::Conformal)?;
+            let known: Vec<Singularities> =
+                maps.iter().map(|m| m.flat.singularities.clone()).collect();
+            for set in sets.into_iter().filter(|s| !known.contains(s)).take(MAPPED) {
+                let first = options(removals(&set.cones)[0]);
+                match Flattened::solve(&mut solver, &set, &first, progress) {
+                    Ok(flat) => maps.extend(resized(flat)),
+                    // Cones on a surface with handles rarely close around them.
+                    Err(
+                        error @ (ConformalError::Holonomy { .. }
+                        | ConformalError::NotConverged { .. }),
+                    ) => refused = Some(error),
+                    Err(error) => return Err(MakeError::Conformal(error)),
+                }
+            }
+            if let Some(error) = refused.filter(|_| maps.is_empty()) {
+                return Err(MakeError::Conformal(error));
+            }
+            maps
+        }
+    };
+    // By what they will miss the surface; of those that miss nothing the one that removes least. The sort is stable.
+    maps.sort_by(|a, b| a.misfit().total_cmp(&b.misfit()));
+    Ok(maps)
+}
+
+/// Radius around a cone, in L, that no triangle's centre comes within: 1/√3 with all triangles in place, 2/√3 without
+/// the four at the cone, 2 rings without sixteen; taken a little smaller for the second and third because corners
+/// reach further in than centres.
+fn clearance(removal: usize) -> f64 {
+    if removal == 0 {
+        0.7
+    } else {
+        (removal as f64 / 4.0).sqrt().floor().max(1.0) + 0.1
+    }
+}
