@@ -92,10 +92,22 @@ fn make_and_judge(args: &[&str]) -> (sheet::Drawing, linkage::Findings) {
         sheet::compare(&drawing, &really, 0.02, 0.15),
         Vec::<String>::new()
     );
-    // The drawing against the linkage: one slit a hinge that is not on a seam, one area a triangle.
-    assert_eq!(drawing.slits.len(), found.hinges - found.seam_hinges);
+    // The drawing against the linkage: one slit a hinge that is not on a seam, one area a triangle, and the same again
+    // for the flaps, which the linkage does not know.
+    let own = drawing.slits.len() - drawing.flap_slits;
+    assert_eq!(own, found.hinges - found.seam_hinges);
+    assert_eq!(drawing.triangles.len(), found.triangles);
+    let (to_sheet, between, faults) = sheet::judge_flaps(&drawing);
+    assert_eq!(faults, Vec::<String>::new());
+    assert_eq!(drawing.flap_slits, to_sheet + between);
+    let report: serde_json::Value = serde_json::from_str(&read(out.join("report.json"))).unwrap();
+    let told = |pointer: &str| report.pointer(pointer).unwrap().as_u64().unwrap() as usize;
+    assert_eq!(told("/sheet/flap_triangles"), drawing.flaps.len());
+    let bare = told("/linkage/seam_edges_without_flaps");
+    assert_eq!(to_sheet, found.seam_hinges - bare);
     let triangle = 0.75f64.sqrt() / 2.0 * drawing.edge * drawing.edge;
-    let relative = sheet::area(&drawing) / (found.triangles as f64 * triangle) - 1.0;
+    let all = found.triangles + drawing.flaps.len();
+    let relative = sheet::area(&drawing) / (all as f64 * triangle) - 1.0;
     assert!(relative.abs() < 1e-4, "area off by {relative:e}");
     assert!((sheet::narrowest_ligament(&drawing) - drawing.hinge).abs() < 1e-3);
     (drawing, found)

@@ -19,7 +19,9 @@ use std::path::PathBuf;
 
 pub use design::{ConeChoice, Design, LinkageChoice, SheetChoice, SolveChoice, SurfaceChoice};
 pub use make::{FILES, Made, make};
-pub use request::{ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, Request, Source};
+pub use request::{
+    ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, FlapWish, Request, Source,
+};
 pub use verdict::{COVERAGE_WANTED, EDGE_TOLERANCE, Reason, Verdict};
 
 use crate::base::catalog::CatalogError;
