@@ -79,7 +79,8 @@
 //! assert_eq!(quality.penetrations + quality.intersections + quality.over_sigma, 0);
 //!
 //! // The sheet, the job, and the proof that one cuts the other.
-//! let sheet = Sheet::new(&built.linkage, material.hinge_width_mm, setting.kerf_mm)?;
+//! let (hinge_mm, kerf_mm) = (material.hinge_width_mm, setting.kerf_mm);
+//! let sheet = Sheet::with_flaps(&built.linkage, &built.flaps, hinge_mm, kerf_mm)?;
 //! let (sheet, _) = placed(&sheet, &machine, false)?;
 //! let cuts = toolpath::plan(&sheet, &setting, machine.park_mm())?;
 //! let text = gcode::write(&cuts, &machine, &material)?;

@@ -92,10 +92,22 @@ fn make_and_judge(args: &[&str]) -> (sheet::Drawing, linkage::Findings) {
         sheet::compare(&drawing, &really, 0.02, 0.15),
         Vec::<String>::new()
     );
-    // The drawing against the linkage: one slit a hinge that is not on a seam, one area a triangle.
-    assert_eq!(drawing.slits.len(), found.hinges - found.seam_hinges);
+    // The drawing against the linkage: one slit a hinge that is not on a seam, one area a triangle, and the same again
+    // for the flaps, which the linkage does not know.
+    let own = drawing.slits.len() - drawing.flap_slits;
+    assert_eq!(own, found.hinges - found.seam_hinges);
+    assert_eq!(drawing.triangles.len(), found.triangles);
+    let (to_sheet, between, faults) = sheet::judge_flaps(&drawing);
+    assert_eq!(faults, Vec::<String>::new());
+    assert_eq!(drawing.flap_slits, to_sheet + between);
+    let report: serde_json::Value = serde_json::from_str(&read(out.join("report.json"))).unwrap();
+    let told = |pointer: &str| report.pointer(pointer).unwrap().as_u64().unwrap() as usize;
+    assert_eq!(told("/sheet/flap_triangles"), drawing.flaps.len());
+    let bare = told("/linkage/seam_edges_without_flaps");
+    assert_eq!(to_sheet, found.seam_hinges - bare);
     let triangle = 0.75f64.sqrt() / 2.0 * drawing.edge * drawing.edge;
-    let relative = sheet::area(&drawing) / (found.triangles as f64 * triangle) - 1.0;
+    let all = found.triangles + drawing.flaps.len();
+    let relative = sheet::area(&drawing) / (all as f64 * triangle) - 1.0;
     assert!(relative.abs() < 1e-4, "area off by {relative:e}");
     assert!((sheet::narrowest_ligament(&drawing) - drawing.hinge).abs() < 1e-3);
     (drawing, found)
@@ -328,6 +340,91 @@ fn a_bump_without_its_cone_gets_a_report_but_no_job() {
         folder.path(),
     );
     assert!(!stderr(&output).contains("misses the surface"));
+}
+
+/// Flaps make the sheet larger, never the linkage: left out because asked for, or because the bed is too small.
+#[test]
+fn flaps_are_of_the_sheet_only_and_can_be_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let output = kagome(args, folder.path());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    };
+    let vase = [
+        "make",
+        "sample:vase",
+        "-q",
+        "--sigma",
+        "2",
+        "--triangles",
+        "200",
+    ];
+    let with = |more: &[&str]| run(&[&vase[..], more].concat());
+    let file = |folder_name: &str, name: &str| read(folder.path().join(folder_name).join(name));
+    let report = |name: &str| -> serde_json::Value {
+        serde_json::from_str(&file(name, "report.json")).unwrap()
+    };
+    let number = |name: &str, pointer: &str| {
+        let value = report(name).pointer(pointer).unwrap().as_f64();
+        value.unwrap_or_else(|| panic!("{pointer}"))
+    };
+    with(&["-o", "auto"]);
+    with(&["-o", "none", "--flaps", "none"]);
+    run(&["make", "none/design.toml", "-q", "-o", "again"]);
+    let in_space = |name: &str| -> Vec<String> {
+        let text = file(name, "linkage.obj");
+        let kept = text.lines().filter(|l| !l.starts_with("vt"));
+        kept.map(str::to_owned).collect()
+    };
+    assert_eq!(in_space("auto"), in_space("none"));
+    let edges = number("auto", "/linkage/seam_edges");
+    let row = number("auto", "/sheet/flap_triangles");
+    assert_eq!(row, 2.0 * edges - 1.0, "the seam of a vase is straight");
+    assert_eq!(number("auto", "/linkage/seam_edges_without_flaps"), 0.0);
+    assert_eq!(number("none", "/sheet/flap_triangles"), 0.0);
+    assert_eq!(number("none", "/linkage/seam_edges_without_flaps"), edges);
+    assert!(file("none", "design.toml").contains("flaps = \"none\""));
+    for name in ALL {
+        assert!(file("none", name) == file("again", name), "{name}");
+    }
+    let words = |name: &str| report(name)["warnings"].to_string();
+    assert!(words("auto").contains("glue each on its double"));
+    assert!(words("none").contains("edge to edge"));
+
+    // A bed that holds the sheet, but not the flaps as well.
+    let size = |name: &str| ["width_mm", "height_mm"].map(|k| number(name, &format!("/sheet/{k}")));
+    let (plain, large) = (size("none"), size("auto"));
+    let grown = (0..2).max_by(|a, b| (large[*a] - plain[*a]).total_cmp(&(large[*b] - plain[*b])));
+    let grown = grown.unwrap();
+    assert!(large[grown] > plain[grown] + 1.0, "{plain:?} {large:?}");
+    let machine = Path::new(env!("CARGO_MANIFEST_DIR")).join("machines/co2-600x400.toml");
+    let mut bed = [2.0 * large[0].max(large[1]); 2];
+    let margins = 2.0
+        * kagome::machine::load(kagome::machine::DEFAULT)
+            .unwrap()
+            .bed
+            .margin_mm;
+    bed[grown] = 0.5 * (plain[grown] + large[grown]) + margins;
+    // The other way round it must not fit either.
+    bed[1 - grown] = bed[1 - grown]
+        .min(large[grown] - 1.0 + margins)
+        .max(plain[1 - grown] + 2.0 + margins);
+    let text: Vec<String> = read(machine)
+        .lines()
+        .map(|line| match line.split('=').next().map(str::trim) {
+            Some("width_mm") => format!("width_mm = {}", bed[0]),
+            Some("height_mm") => format!("height_mm = {}", bed[1]),
+            _ => line.to_owned(),
+        })
+        .collect();
+    std::fs::write(folder.path().join("small.toml"), text.join("\n")).unwrap();
+    with(&["-o", "small", "--machine", "./small.toml"]);
+    assert_eq!(number("small", "/sheet/flap_triangles"), 0.0);
+    assert!(
+        words("small").contains("larger than the bed"),
+        "{}",
+        words("small")
+    );
 }
 
 /// Bad input: exit code 2, words that help, and nothing left behind.

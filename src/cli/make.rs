@@ -9,8 +9,8 @@ use super::{Failure, Global, Terminal, print, print_json};
 use crate::base::atomic::check_directory;
 use crate::conformal::Sizing;
 use crate::job::{
-    ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, Design, FILES, Made,
-    MakeError, Request, Source, make,
+    ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, Design, FILES, FlapWish,
+    Made, MakeError, Request, Source, make,
 };
 use crate::linkage::Handedness;
 use crate::rationalize::Solver;
@@ -85,6 +85,9 @@ pub struct MakeArgs {
     /// Cut from the back: the beam strikes the side that will face inwards
     #[arg(long)]
     mirror: bool,
+    /// Rows of triangles that are cut twice along the seams, to be glued on the other side
+    #[arg(long, value_enum, default_value_t = FlapsArg::Auto)]
+    flaps: FlapsArg,
     /// exact, or projection (the paper's method: a preview that rarely passes)
     #[arg(long, value_enum, default_value_t = SolverArg::Exact)]
     solver: SolverArg,
@@ -222,6 +225,14 @@ enum PatternArg {
 }
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum FlapsArg {
+    /// Wherever there is room for them on the sheet
+    Auto,
+    /// No flaps: seams are joined edge to edge
+    None,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
 enum SolverArg {
     Exact,
     Projection,
@@ -292,6 +303,7 @@ fn decided_by_design(args: &MakeArgs) -> Vec<&'static str> {
         (args.orientation.0.is_some(), "--orientation"),
         (matches!(args.pattern, PatternArg::Left), "--pattern"),
         (args.mirror, "--mirror"),
+        (matches!(args.flaps, FlapsArg::None), "--flaps"),
         (matches!(args.solver, SolverArg::Projection), "--solver"),
         (args.surface.size.is_some(), "--size"),
         (args.surface.scale != 1.0, "--scale"),
@@ -364,6 +376,10 @@ fn from_arguments(args: &MakeArgs) -> Result<Request, Failure> {
             PatternArg::Left => Handedness::Left,
         },
         remove_at_cone: args.remove,
+        flaps: match args.flaps {
+            FlapsArg::Auto => FlapWish::Auto,
+            FlapsArg::None => FlapWish::None,
+        },
         solver: match args.solver {
             SolverArg::Exact => Solver::Exact,
             SolverArg::Projection => Solver::Projection,

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::MakeError;
-use super::request::{ConePlace, ConeWish, DartWish, Request, Source};
+use super::request::{ConePlace, ConeWish, DartWish, FlapWish, Request, Source};
 use crate::base::document::{Complaint, Document, ranged};
 use crate::conformal::Sizing;
 use crate::linkage::Handedness;
@@ -95,6 +95,9 @@ pub struct LinkageChoice {
     /// How far each rim but the first turns, multiples of 120°.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rim_turnings_deg: Vec<i32>,
+    /// Doubled rows along the seams.
+    #[serde(default)]
+    pub flaps: FlapWish,
 }
 
 /// `[solve]`.
@@ -306,6 +309,7 @@ impl Design {
             orientation_deg: Some(self.linkage.orientation_deg),
             handedness: self.linkage.pattern,
             remove_at_cone: Some(self.linkage.remove_at_cone),
+            flaps: self.linkage.flaps,
             solver: self.solve.solver,
             accept_distance: self.solve.accept_distance,
         }

@@ -220,6 +220,7 @@ fn decided(
             pattern: request.handedness,
             remove_at_cone: shape.removed,
             rim_turnings_deg: shape.flat.singularities.rim_turnings_deg(),
+            flaps: request.flaps,
         },
         solve: SolveChoice {
             solver: request.solver,

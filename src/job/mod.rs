@@ -23,7 +23,7 @@ pub use design::{
 };
 pub use make::{FILES, Made, make};
 pub use request::{
-    ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, Request, Source,
+    ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, FlapWish, Request, Source,
 };
 pub use verdict::{COVERAGE_WANTED, EDGE_TOLERANCE, Reason, Verdict};
 

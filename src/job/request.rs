@@ -50,6 +50,17 @@ pub enum DartWish {
     Given(Vec<Vec<ConePlace>>),
 }
 
+/// Which seams get doubled rows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FlapWish {
+    /// Every seam, where there is room, on the side that has more of it; none if the sheet fits the bed only without.
+    #[default]
+    Auto,
+    /// None.
+    None,
+}
+
 /// Everything that `make` needs.
 #[derive(Clone, Debug)]
 pub struct Request {
@@ -83,6 +94,8 @@ pub struct Request {
     pub handedness: Handedness,
     /// Triangles to drop at the cone; `None`: at a positive cone 4, or 16 where λ asks for it.
     pub remove_at_cone: Option<usize>,
+    /// Doubled rows along the seams.
+    pub flaps: FlapWish,
     /// Solver.
     pub solver: Solver,
     /// Distance from the surface that passes, in L.
@@ -111,6 +124,7 @@ impl Request {
             orientation_deg: None,
             handedness: Handedness::Right,
             remove_at_cone: None,
+            flaps: FlapWish::Auto,
             solver: Solver::Exact,
             accept_distance: ACCEPT_DISTANCE,
         }

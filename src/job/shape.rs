@@ -11,17 +11,17 @@ use nalgebra::{Point2, Point3};
 use super::MakeError;
 use super::load::Loaded;
 use super::maps::{Ground, Map, maps};
-use super::request::{ConeWish, Request};
+use super::request::{ConeWish, FlapWish, Request};
 use super::verdict::{Verdict, place};
 use crate::base::progress::Progress;
 use crate::base::units::short;
 use crate::conformal::{
     ConformalError, Dart, FlattenOptions, Flattened, Sizing, around_handles, patches, to_goals,
 };
-use crate::linkage::{Built, Linkage, LinkageOptions, build, fit};
+use crate::linkage::{Built, Flaps, Linkage, LinkageOptions, build, fit};
 use crate::machine::Machine;
 use crate::mesh::{ClosestPoint, Surface};
-use crate::pattern::{self, Sheet};
+use crate::pattern::{self, PatternError, Sheet};
 use crate::rationalize::{Effort, Quality, rationalize};
 
 /// What the sheet is to be, whatever its shape.
@@ -50,6 +50,10 @@ pub(crate) struct Shape {
     pub orientation_deg: f64,
     /// Angle distortion that fitting the lattice to the seams added, root mean square; 0 for none.
     pub distortion: f64,
+    /// Doubled rows along the seams, as they are cut.
+    pub flaps: Flaps,
+    /// True if the sheet fits the bed only without the doubled rows that it should have.
+    pub flaps_too_large: bool,
     /// The sheet in its place on the bed; none if triangles lie on one another.
     pub sheet: Option<Sheet>,
     /// The linkage with its flat positions there.
@@ -235,11 +239,24 @@ fn attempt(
     progress.note(&describe_map(&flat, surface, stock.sigma));
     // The sheet depends on flat positions only: what does not fit the bed is known before the long solve.
     let (mut sheet, mut motion) = (None, None);
+    let mut flaps = match request.flaps {
+        FlapWish::Auto => built.flaps.clone(),
+        FlapWish::None => built.flaps.none(),
+    };
+    let mut flaps_too_large = false;
     if built.overlaps.is_empty() {
-        let drawn = Sheet::new(&built.linkage, stock.hinge_width_mm, stock.kerf_mm)
-            .map_err(MakeError::Pattern)?;
-        let (placed, how) =
-            pattern::placed(&drawn, stock.machine, request.mirror).map_err(MakeError::Pattern)?;
+        let draw = |flaps: &Flaps| {
+            let (hinge, kerf) = (stock.hinge_width_mm, stock.kerf_mm);
+            let drawn = Sheet::with_flaps(&built.linkage, flaps, hinge, kerf)?;
+            pattern::placed(&drawn, stock.machine, request.mirror)
+        };
+        let mut drawn = draw(&flaps);
+        if matches!(drawn, Err(PatternError::TooLarge { .. })) && !flaps.flaps.is_empty() {
+            let without = flaps.none();
+            drawn = draw(&without);
+            (flaps, flaps_too_large) = (without, true);
+        }
+        let (placed, how) = drawn.map_err(MakeError::Pattern)?;
         (sheet, motion) = (Some(placed), Some(how));
     }
     let moved = |p: Point2<f64>| match &motion {
@@ -282,6 +299,8 @@ fn attempt(
         removed: map.removal,
         orientation_deg,
         distortion,
+        flaps,
+        flaps_too_large,
         sheet,
         linkage,
         chart,

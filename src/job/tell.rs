@@ -84,12 +84,36 @@ pub(crate) fn warnings(
         ));
     }
     if built.seam_edges > 0 {
-        warnings.push(format!(
-            "the sheet has seams of {} triangle edges in all: their two sides must be joined by hand, edge to edge",
-            built.seam_edges
-        ));
+        warnings.push(seams(shape));
     }
     warnings
+}
+
+/// What there is to join, and how.
+fn seams(shape: &Shape) -> String {
+    let (all, count) = (shape.built.seam_edges, shape.flaps.flaps.len());
+    let bare = shape.flaps.bare_edges();
+    let edges = |n: usize| match n {
+        1 => "1 triangle edge".to_owned(),
+        n => format!("{n} triangle edges"),
+    };
+    let head = format!("the sheet has seams of {} in all", edges(all));
+    let larger = if shape.flaps_too_large {
+        " (rows of flaps to glue them on would make the sheet larger than the bed)"
+    } else {
+        ""
+    };
+    match (count, bare) {
+        (0, _) => format!("{head}: their two sides must be joined by hand, edge to edge{larger}"),
+        (_, 0) => format!(
+            "{head}: a row of {count} flap triangles along them doubles the triangles of the other side; glue each on its double"
+        ),
+        _ => format!(
+            "{head}: {count} flap triangles along {} of them double the triangles of the other side; glue each on its double. Along {} there is no room for flaps: join these edge to edge",
+            all - bare,
+            edges(bare),
+        ),
+    }
 }
 
 fn source_in_words(source: SigmaSource) -> &'static str {
@@ -126,8 +150,12 @@ pub(crate) fn summary(
         lines.push((
             "Pattern".to_owned(),
             format!(
-                "{} triangles of {} mm, {} slits, hinges {} mm wide, cut {} mm wide",
+                "{} triangles{} of {} mm, {} slits, hinges {} mm wide, cut {} mm wide",
                 figures.triangles,
+                match figures.flaps {
+                    0 => String::new(),
+                    n => format!(" and {n} flap triangles"),
+                },
                 short(flat.edge_mm, 2),
                 figures.slits,
                 short(sheet.metadata.hinge_width_mm, 2),
@@ -236,13 +264,17 @@ pub(crate) fn figures(
             "removed_at_cone": built.removed,
             "left_out_at_rim": built.lost,
             "seam_edges": built.seam_edges,
+            "seam_edges_without_flaps": shape.flaps.bare_edges(),
+            "seam_segments": shape.flaps.segments,
             "pieces": built.pieces,
             "overlaps_on_sheet": built.overlaps.len(),
         },
         "solve": { "steps": shape.effort.steps, "factorizations": shape.effort.factorizations },
         "quality": shape.quality,
         "sheet": sheet.map(|s| json!({
+            "flap_triangles": s.flaps,
             "slits": s.slits,
+            "flap_slits": s.flap_slits,
             "stars": s.stars,
             "contours": s.contours,
             "slit_length_mm": s.slit_length_mm,

@@ -3,11 +3,13 @@
 //! [`fit`] warps a [`Layout`] so that a lattice goes on across its seams, with a vertex on every cone. [`build`] lays
 //! the lattice of edge L on it, keeps the triangles that lie wholly on the surface and are held by at least two others,
 //! cuts the seam along lattice lines, places every triangle flat and closed on the sheet, and lifts the linkage, opened
-//! as λ asks, back onto the surface.
+//! as λ asks, back onto the surface. [`Flaps`] are the rows of triangles that are cut a second time along the seam, to be
+//! glued on.
 //! [`write_obj`] is the format that other programs read.
 
 mod clip;
 mod continuity;
+mod flaps;
 mod lattice;
 mod lift;
 mod net;
@@ -20,6 +22,9 @@ mod walk;
 use nalgebra::{Point2, Point3};
 
 pub use continuity::{Fitted, fit};
+#[cfg(test)]
+pub(crate) use flaps::tests::cylinder as cylinder_with_flaps;
+pub use flaps::{Flap, Flaps, SeamSegment};
 pub use lattice::Lattice;
 pub use lift::opening_turn;
 pub use obj::write_obj;
@@ -63,6 +68,8 @@ pub struct Built {
     pub pieces: usize,
     /// Length of the seam in lattice edges; 0 without.
     pub seam_edges: usize,
+    /// Doubled rows along the seam, which are cut but are no part of the linkage.
+    pub flaps: Flaps,
 }
 
 /// Why there is no linkage.
@@ -169,6 +176,7 @@ pub fn build(
         overlaps: flat.overlaps.iter().map(|&(a, b)| (id(a), id(b))).collect(),
         pieces: flat.pieces,
         seam_edges: flat.seam_edges,
+        flaps: flat.flaps,
     })
 }
 

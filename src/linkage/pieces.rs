@@ -10,6 +10,7 @@ use std::collections::{HashMap, VecDeque};
 use nalgebra::Point2;
 
 use super::clip::Laid;
+use super::flaps::{self, Flaps};
 use super::lattice::Lattice;
 use super::net::{Net, Spot, beyond};
 use super::seam::{Price, Seam};
@@ -32,6 +33,8 @@ pub(crate) struct Flat {
     pub overlaps: Vec<(usize, usize)>,
     /// Lattice edges of the seam: those between neighbours that do not lie side by side.
     pub seam_edges: usize,
+    /// Doubled rows along the seam.
+    pub flaps: Flaps,
 }
 
 /// Chooses the seam and lays every triangle flat. The piece of `root` keeps the place that it has in its chart; `price`
@@ -62,11 +65,17 @@ pub(crate) fn flatten(laid: &[Laid], lattice: &Lattice, root: usize, price: Pric
         pieces,
         overlaps,
         seam_edges,
+        flaps: flaps::rows(&net, &spots, laid, lattice),
     }
 }
 
 /// Lattice corners of every triangle and the number of pieces.
-fn lay(net: &Net, root: usize, start: [Spot; 3], price: Price<'_>) -> (Vec<[Spot; 3]>, usize) {
+pub(super) fn lay(
+    net: &Net,
+    root: usize,
+    start: [Spot; 3],
+    price: Price<'_>,
+) -> (Vec<[Spot; 3]>, usize) {
     let seam = Seam::choose(net, price);
     let mut sheet = Sheet {
         net,
@@ -92,17 +101,19 @@ fn lay(net: &Net, root: usize, start: [Spot; 3], price: Price<'_>) -> (Vec<[Spot
 
 /// A motion of the lattice: a turn by so many times 60°, then a shift.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Motion {
+pub(super) struct Motion {
     turn: usize,
     shift: Spot,
 }
 
 impl Motion {
-    fn turned((i, j): Spot, turn: usize) -> Spot {
+    /// A spot turned about the origin.
+    pub(super) fn turned((i, j): Spot, turn: usize) -> Spot {
         (0..turn).fold((i, j), |(i, j), _| (-j, i + j))
     }
 
-    fn apply(&self, spot: Spot) -> Spot {
+    /// Where a spot goes.
+    pub(super) fn apply(&self, spot: Spot) -> Spot {
         let (i, j) = Self::turned(spot, self.turn);
         (i + self.shift.0, j + self.shift.1)
     }
@@ -117,7 +128,7 @@ impl Motion {
     }
 
     /// The motion that takes one triangle to another.
-    fn between(from: &[Spot; 3], to: &[Spot; 3]) -> Self {
+    pub(super) fn between(from: &[Spot; 3], to: &[Spot; 3]) -> Self {
         let side = |t: &[Spot; 3]| (t[1].0 - t[0].0, t[1].1 - t[0].1);
         let turn = (0..6)
             .find(|&k| Self::turned(side(from), k) == side(to))
@@ -131,14 +142,14 @@ impl Motion {
 }
 
 /// Three times a triangle's centroid: no other triangle has the same.
-fn middle(corners: &[Spot; 3]) -> Spot {
+pub(super) fn middle(corners: &[Spot; 3]) -> Spot {
     corners
         .iter()
         .fold((0, 0), |sum, c| (sum.0 + c.0, sum.1 + c.1))
 }
 
 /// Three times the centroid of the lattice triangle across a side.
-fn middle_beyond(corners: &[Spot; 3], side: usize) -> Spot {
+pub(super) fn middle_beyond(corners: &[Spot; 3], side: usize) -> Spot {
     middle(&beyond(corners, side, 0))
 }
 
@@ -392,18 +403,18 @@ fn vertices(spots: impl Iterator<Item = Spot>) -> Vec<Spot> {
 
 /// A box in half steps along the lattice's first axis and in rows.
 #[derive(Clone, Copy, Debug)]
-struct Bounds {
+pub(super) struct Bounds {
     low: [i64; 2],
     high: [i64; 2],
 }
 
 impl Bounds {
-    const EMPTY: Self = Self {
+    pub(super) const EMPTY: Self = Self {
         low: [i64::MAX; 2],
         high: [i64::MIN; 2],
     };
 
-    fn add(&mut self, (i, j): Spot) {
+    pub(super) fn add(&mut self, (i, j): Spot) {
         let at = [2 * i64::from(i) + i64::from(j), i64::from(j)];
         for k in 0..2 {
             self.low[k] = self.low[k].min(at[k]);
@@ -412,7 +423,7 @@ impl Bounds {
     }
 
     /// Area of the box around both, then its half perimeter, in a measure that is the same for all.
-    fn cost_with(&self, other: &Self, shift: [i64; 2]) -> (i64, i64) {
+    pub(super) fn cost_with(&self, other: &Self, shift: [i64; 2]) -> (i64, i64) {
         let extent: [i64; 2] = std::array::from_fn(|k| {
             self.high[k].max(other.high[k] + shift[k]) - self.low[k].min(other.low[k] + shift[k])
         });
@@ -449,7 +460,7 @@ fn place(spots: &[Spot], all: &Bounds, taken: &std::collections::HashSet<Spot>) 
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::Colour;
     use super::super::clip::{around_cones, core};
     use super::*;
@@ -542,7 +553,7 @@ mod tests {
         laid
     }
 
-    fn octahedron(n: i32) -> Vec<Laid> {
+    pub(in crate::linkage) fn octahedron(n: i32) -> Vec<Laid> {
         let faces = [
             [0, 1, 2],
             [0, 2, 3],
@@ -557,7 +568,7 @@ mod tests {
     }
 
     /// The vertex of `size` triangles, divided, without the triangles of the `hole` rings around it.
-    fn cone(size: usize, n: i32, hole: usize) -> Vec<Laid> {
+    pub(in crate::linkage) fn cone(size: usize, n: i32, hole: usize) -> Vec<Laid> {
         let fan: Vec<Sides> = (0..size)
             .map(|k| {
                 [
@@ -587,7 +598,12 @@ mod tests {
     }
 
     /// A parallelogram of a × b cells, its sides glued by translation, after `skew` cells, where asked.
-    fn parallelogram(a: i32, b: i32, skew: i32, glued: [bool; 2]) -> Vec<Laid> {
+    pub(in crate::linkage) fn parallelogram(
+        a: i32,
+        b: i32,
+        skew: i32,
+        glued: [bool; 2],
+    ) -> Vec<Laid> {
         let at = |mut i: i32, mut j: i32, down: i32, side: usize| {
             if !(0..b).contains(&j) {
                 if !glued[1] {
@@ -612,7 +628,7 @@ mod tests {
     }
 
     /// Two tori, joined along the rims of a hexagon taken from each: six vertices of eight triangles, two handles.
-    fn double_torus(n: i32) -> Vec<Laid> {
+    pub(in crate::linkage) fn double_torus(n: i32) -> Vec<Laid> {
         let torus = parallelogram(n, n, 0, [true, true]);
         let net = Net::new(&torus);
         let centre = net.node[3 * (n * n) as usize];
@@ -656,7 +672,7 @@ mod tests {
     }
 
     /// A vertex of eight triangles between two of four; see the faces.
-    fn saddle_between_cones(n: i32) -> Vec<Laid> {
+    pub(in crate::linkage) fn saddle_between_cones(n: i32) -> Vec<Laid> {
         let mut faces: Vec<[usize; 3]> = (0..8).map(|k| [0, 1 + k, 1 + (k + 1) % 8]).collect();
         faces.extend([[1, 8, 9], [1, 9, 2], [5, 4, 10], [5, 10, 6]]);
         divided(&joined(&faces), n)

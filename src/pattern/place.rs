@@ -42,7 +42,7 @@ impl Motion {
                 contour.points.reverse();
             }
         }
-        for triangle in &mut moved.triangles {
+        for triangle in moved.triangles.iter_mut().chain(&mut moved.flaps) {
             *triangle = triangle.map(|p| self.point(p));
             if self.mirror {
                 triangle.swap(1, 2);

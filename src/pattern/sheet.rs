@@ -1,5 +1,6 @@
 //! Slits whose ligaments are exactly as wide as asked, and the sheet around them.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use kurbo::{Point, Rect};
@@ -7,7 +8,7 @@ use kurbo::{Point, Rect};
 use super::contour;
 use crate::base::ids::{Id, Per};
 use crate::base::union::Union;
-use crate::linkage::{Linkage, Triangle, TriangleId};
+use crate::linkage::{Flaps, Linkage, Triangle, TriangleId};
 
 /// Largest neck c (the uncut end of a slit's lattice edge) in edge lengths.
 ///
@@ -24,6 +25,8 @@ pub struct Slit {
     pub tip: Point,
     /// The star: slits with the same number have one tail. Counted from 0 without gaps.
     pub star: u32,
+    /// True if it runs along a flap triangle.
+    pub flap: bool,
 }
 
 /// A closed edge of the finished part, first point not repeated, material on the left.
@@ -55,6 +58,8 @@ pub struct Sheet {
     pub contours: Vec<Contour>,
     /// The triangles, for the eye; never cut.
     pub triangles: Vec<[Point; 3]>,
+    /// The flap triangles of doubled rows along the seam, for the eye; their slits and edges are among the others.
+    pub flaps: Vec<[Point; 3]>,
     /// Hinge width, kerf, edge.
     pub metadata: SheetMetadata,
 }
@@ -62,10 +67,14 @@ pub struct Sheet {
 /// What a sheet amounts to.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Figures {
-    /// Number of triangles.
+    /// Number of triangles, flap triangles not counted.
     pub triangles: usize,
-    /// Number of slits.
+    /// Number of flap triangles.
+    pub flaps: usize,
+    /// Number of slits, all in all.
     pub slits: usize,
+    /// Number of slits along flap triangles.
+    pub flap_slits: usize,
     /// Number of stars.
     pub stars: usize,
     /// Number of closed contours.
@@ -203,6 +212,19 @@ impl Sheet {
     /// # Errors
     /// [`PatternError`]: nothing to cut, widths that the triangles do not allow, a layout that overlaps itself.
     pub fn new(linkage: &Linkage, hinge_width_mm: f64, kerf_mm: f64) -> Result<Self, PatternError> {
+        Self::with_flaps(linkage, &Flaps::default(), hinge_width_mm, kerf_mm)
+    }
+
+    /// As [`Sheet::new`], with doubled rows along the seam, which are cut like all else.
+    ///
+    /// # Errors
+    /// As [`Sheet::new`].
+    pub fn with_flaps(
+        linkage: &Linkage,
+        flaps: &Flaps,
+        hinge_width_mm: f64,
+        kerf_mm: f64,
+    ) -> Result<Self, PatternError> {
         let metadata = SheetMetadata {
             hinge_width_mm,
             kerf_mm,
@@ -212,16 +234,23 @@ impl Sheet {
         if linkage.triangles.is_empty() {
             return Err(PatternError::Empty);
         }
-        let triangles: Vec<[Point; 3]> = linkage
+        let own = linkage.triangles.len();
+        let whole = if flaps.flaps.is_empty() {
+            Cow::Borrowed(linkage)
+        } else {
+            Cow::Owned(flaps.on_sheet(linkage))
+        };
+        let mut triangles: Vec<[Point; 3]> = whole
             .triangles
             .iter()
             .map(|t| t.flat.map(|p| Point::new(p.x, p.y)))
             .collect();
         check_overlap(&triangles, linkage.edge_mm)?;
-        let neighbours = linkage.flat_neighbours();
+        let neighbours = whole.flat_neighbours();
         Ok(Self {
-            slits: slits(linkage, &neighbours, metadata.neck_mm()),
+            slits: slits(&whole, &neighbours, metadata.neck_mm(), own),
             contours: contour::trace(&triangles, &neighbours, linkage.edge_mm)?,
+            flaps: triangles.split_off(own),
             triangles,
             metadata,
         })
@@ -241,7 +270,9 @@ impl Sheet {
         let bounds = self.bounds();
         Figures {
             triangles: self.triangles.len(),
+            flaps: self.flaps.len(),
             slits: self.slits.len(),
+            flap_slits: self.slits.iter().filter(|s| s.flap).count(),
             stars: self
                 .slits
                 .iter()
@@ -275,14 +306,16 @@ pub(crate) fn signed_area(points: &[Point]) -> f64 {
         .sum()
 }
 
-/// The slits of all hinges that the sheet does not cut open, star by star.
+/// The slits of all hinges that the sheet does not cut open, star by star, in each those along flaps last. The flap
+/// triangles are those from number `flaps_from` on.
 fn slits(
     linkage: &Linkage,
     neighbours: &Per<TriangleId, [Option<(TriangleId, usize)>; 3]>,
     neck_mm: f64,
+    flaps_from: usize,
 ) -> Vec<Slit> {
     let vertex = flat_vertices(&linkage.triangles, neighbours);
-    let mut found: Vec<(u32, usize, Point, Point)> = Vec::with_capacity(linkage.hinges.len());
+    let mut found: Vec<(u32, bool, usize, Point, Point)> = Vec::with_capacity(linkage.hinges.len());
     for (order, hinge) in linkage.hinges.iter().enumerate().filter(|(_, h)| !h.seam) {
         let flat = &linkage.triangles[hinge.ccw.triangle].flat;
         let (from, to) = ((hinge.ccw.corner + 2) % 3, hinge.ccw.corner);
@@ -291,18 +324,23 @@ fn slits(
             Point::new(flat[to].x, flat[to].y),
         );
         let tip = b + (a - b).normalize() * neck_mm;
-        found.push((vertex[hinge.ccw.triangle.index() * 3 + from], order, a, tip));
+        let star = vertex[hinge.ccw.triangle.index() * 3 + from];
+        let flap = [hinge.ccw, hinge.cw]
+            .iter()
+            .any(|c| c.triangle.index() >= flaps_from);
+        found.push((star, flap, order, a, tip));
     }
-    found.sort_by_key(|&(star, order, ..)| (star, order));
+    found.sort_by_key(|&(star, flap, order, ..)| (star, flap, order));
     let mut numbers = BTreeMap::new();
     found
         .into_iter()
-        .map(|(root, _, tail, tip)| {
+        .map(|(root, flap, _, tail, tip)| {
             let next = numbers.len() as u32;
             Slit {
                 tail,
                 tip,
                 star: *numbers.entry(root).or_insert(next),
+                flap,
             }
         })
         .collect()
@@ -484,5 +522,42 @@ mod tests {
         }
         let whole = cells.len() as f64 * 0.75f64.sqrt() / 2.0 * 81.0;
         assert!((sheet.figures().area_mm2 - whole).abs() < 1e-9);
+    }
+    #[test]
+    fn a_doubled_row_is_cut_like_the_rest_of_the_sheet() {
+        for (around, across) in [(5, 2), (9, 6)] {
+            let (linkage, flaps) = crate::linkage::cylinder_with_flaps(10.0, around, across);
+            let bare = Sheet::new(&linkage, 0.8, 0.2).unwrap();
+            let sheet = Sheet::with_flaps(&linkage, &flaps, 0.8, 0.2).unwrap();
+            let (old, new) = (bare.figures(), sheet.figures());
+            let row = 2 * across as usize - 1;
+            assert_eq!((old.flaps, new.flaps), (0, row));
+            assert_eq!(old.triangles, new.triangles);
+            // One slit an edge of the seam, and one between each two of the row.
+            let slits = across as usize + row - 1;
+            assert_eq!((old.flap_slits, new.flap_slits), (0, slits));
+            assert_eq!(new.slits, old.slits + slits);
+            let each = 0.75f64.sqrt() / 2.0 * 100.0;
+            assert!((new.area_mm2 - old.area_mm2 - row as f64 * each).abs() < 1e-9);
+            // Still one part; n edges of its rim are inside now, a trapezium of n − 1 and twice 1 is around them.
+            assert_eq!(sheet.contours.len(), 1);
+            assert!((new.contour_length_mm - old.contour_length_mm - 10.0).abs() < 1e-9);
+            // The slits of the sheet are where they were.
+            let mut kept = sheet.slits.iter().filter(|s| !s.flap);
+            let near =
+                |a: &Slit, b: &Slit| a.tail.distance(b.tail) < 1e-9 && a.tip.distance(b.tip) < 1e-9;
+            assert!(kept.all(|s| bare.slits.iter().any(|o| near(s, o))));
+            // Star by star, three arms at most, at 120° to each other.
+            for star in sheet.slits.chunk_by(|a, b| a.star == b.star) {
+                assert!(star.len() <= 3);
+                for (n, s) in star.iter().enumerate().skip(1) {
+                    assert!(s.tail.distance(star[0].tail) < 1e-9);
+                    let (u, v) = (star[n - 1].tip - star[n - 1].tail, s.tip - s.tail);
+                    assert!((u.dot(v) / u.hypot2() + 0.5).abs() < 1e-9);
+                }
+            }
+            let numbers: Vec<u32> = sheet.slits.iter().map(|s| s.star).collect();
+            assert!(numbers.is_sorted());
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! The drawing of a sheet, and reading it back.
 //!
 //! True to size in millimetres, one group and one colour an operation, Y flipped so that a viewer shows what the beam
-//! strikes. Numbers that are not geometry ride along as `data-kagome-*` attributes of the root.
+//! strikes. The slits of doubled rows have a group of their own, `flaps`; the contour goes around sheet and flaps, for a
+//! part is cut out along one closed line. Numbers that are not geometry ride along as `data-kagome-*` attributes of the root.
 
 use kurbo::{BezPath, PathEl, Point, Rect};
 use svg::node::element::{Group, Path};
@@ -24,7 +25,11 @@ const SHORTEST_MM: f64 = 1e-3;
 /// Colours as laser programs sort operations by them.
 const CONTOUR: &str = "#ff0000";
 const SLITS: &str = "#0000ff";
+const FLAPS: &str = "#00a000";
 const GUIDE: &str = "#c0c0c0";
+
+/// The class of a flap triangle's outline.
+const FLAP: &str = "flap";
 
 /// The sheet as SVG text.
 pub fn svg(sheet: &Sheet) -> String {
@@ -50,24 +55,29 @@ pub fn svg(sheet: &Sheet) -> String {
     for triangle in &sheet.triangles {
         guide = guide.add(Path::new().set("d", closed(triangle)));
     }
-    let mut slits = group("slits", SLITS, "0.1");
-    for slit in &sheet.slits {
-        let mut path = BezPath::new();
-        path.move_to(slit.tail);
-        path.line_to(slit.tip);
-        slits = slits.add(
-            Path::new()
-                .set("d", data(&path))
-                .set("data-star", slit.star.to_string()),
-        );
+    for triangle in &sheet.flaps {
+        guide = guide.add(Path::new().set("class", FLAP).set("d", closed(triangle)));
     }
+    let lines = |id: &str, colour: &str, flap: bool| {
+        let chosen = sheet.slits.iter().filter(|slit| slit.flap == flap);
+        chosen.fold(group(id, colour, "0.1"), |lines, slit| {
+            let mut path = BezPath::new();
+            path.move_to(slit.tail);
+            path.line_to(slit.tip);
+            lines.add(
+                Path::new()
+                    .set("d", data(&path))
+                    .set("data-star", slit.star.to_string()),
+            )
+        })
+    };
     let mut contour = group("contour", CONTOUR, "0.1");
     for c in &sheet.contours {
         let class = if c.outer { "outer" } else { "inner" };
         contour = contour.add(Path::new().set("class", class).set("d", closed(&c.points)));
     }
     let m = &sheet.metadata;
-    let document = svg::Document::new()
+    let mut document = svg::Document::new()
         .set("width", format!("{width}mm"))
         .set("height", format!("{height}mm"))
         .set(
@@ -83,8 +93,11 @@ pub fn svg(sheet: &Sheet) -> String {
         .set("data-kagome-hinge-width-mm", exact(m.hinge_width_mm))
         .set("data-kagome-kerf-mm", exact(m.kerf_mm))
         .add(guide)
-        .add(slits)
-        .add(contour);
+        .add(lines("slits", SLITS, false));
+    if !sheet.flaps.is_empty() {
+        document = document.add(lines("flaps", FLAPS, true));
+    }
+    let document = document.add(contour);
     format!("{document}\n")
 }
 
@@ -186,6 +199,7 @@ pub fn read_svg(text: &str) -> Result<Sheet, SvgError> {
         slits: Vec::new(),
         contours: Vec::new(),
         triangles: Vec::new(),
+        flaps: Vec::new(),
         metadata,
     };
     for node in root.descendants().filter(roxmltree::Node::is_element) {
@@ -202,18 +216,27 @@ pub fn read_svg(text: &str) -> Result<Sheet, SvgError> {
         let group = node.ancestors().skip(1).find_map(|a| a.attribute("id"));
         match (node.tag_name().name(), group) {
             ("svg" | "g", _) => {}
-            ("path", Some(group @ ("guide" | "slits" | "contour"))) => {
+            ("path", Some(group @ ("guide" | "slits" | "flaps" | "contour"))) => {
                 let d = node.attribute("d").unwrap_or("");
                 let (points, is_closed) = polyline(d).map_err(wrong)?;
                 match (group, is_closed, points.len()) {
-                    ("guide", true, 3) => sheet.triangles.push([points[0], points[1], points[2]]),
-                    ("slits", false, 2) => sheet.slits.push(Slit {
+                    ("guide", true, 3) => {
+                        let flap = node.attribute("class") == Some(FLAP);
+                        let list = if flap {
+                            &mut sheet.flaps
+                        } else {
+                            &mut sheet.triangles
+                        };
+                        list.push([points[0], points[1], points[2]]);
+                    }
+                    ("slits" | "flaps", false, 2) => sheet.slits.push(Slit {
                         tail: points[0],
                         tip: points[1],
                         star: node
                             .attribute("data-star")
                             .and_then(|s| s.parse().ok())
                             .ok_or_else(|| wrong("a slit without a number in data-star".into()))?,
+                        flap: group == "flaps",
                     }),
                     ("contour", true, 3..) => sheet.contours.push(Contour {
                         outer: signed_area(&points) > 0.0,
@@ -234,6 +257,8 @@ pub fn read_svg(text: &str) -> Result<Sheet, SvgError> {
     if sheet.contours.is_empty() {
         return Err(SvgError::NotOurs("the drawing has no contour".into()));
     }
+    // Slits along flaps belong to the stars of the sheet; the sort keeps the order in each.
+    sheet.slits.sort_by_key(|slit| slit.star);
     Ok(sheet)
 }
 
@@ -314,6 +339,27 @@ mod tests {
         }
         assert_eq!(svg(&two), text);
         assert!(!text.contains("-0.0000"));
+    }
+
+    #[test]
+    fn flaps_have_a_group_of_their_own_and_are_read_back() {
+        let (linkage, flaps) = crate::linkage::cylinder_with_flaps(8.0, 7, 4);
+        let one = Sheet::with_flaps(&linkage, &flaps, 0.7, 0.15).unwrap();
+        let text = svg(&one);
+        let document = roxmltree::Document::parse(&text).unwrap();
+        let root = document.root_element();
+        let groups: Vec<_> = root.children().filter_map(|n| n.attribute("id")).collect();
+        assert_eq!(groups, ["guide", "slits", "flaps", "contour"]);
+        let two = read_svg(&text).unwrap();
+        assert_eq!(two.flaps.len(), 7);
+        assert_eq!(two.triangles.len(), one.triangles.len());
+        // In the same order too: strokes go through pairs of a star.
+        let names = |s: &Sheet| -> Vec<_> { s.slits.iter().map(|s| (s.star, s.flap)).collect() };
+        assert_eq!(names(&one), names(&two));
+        for (a, b) in one.slits.iter().zip(&two.slits) {
+            assert!(a.tail.distance(b.tail) < 1e-4 && a.tip.distance(b.tip) < 1e-4);
+        }
+        assert_eq!(svg(&two), text);
     }
 
     #[test]

@@ -8,9 +8,12 @@ type P = [f64; 2];
 
 /// What is wanted.
 pub struct Drawing {
+    /// All of them, those of the flaps last.
     pub slits: Vec<[P; 2]>,
+    pub flap_slits: usize,
     pub contours: Vec<Vec<P>>,
     pub triangles: Vec<Vec<P>>,
+    pub flaps: Vec<Vec<P>>,
     pub kerf: f64,
     pub hinge: f64,
     pub edge: f64,
@@ -42,19 +45,32 @@ pub fn read_drawing(svg: &str) -> Drawing {
             .parse::<f64>()
             .expect(name)
     };
-    let group = |id: &str| -> Vec<Vec<P>> {
-        let start = svg
-            .find(&format!("id=\"{id}\""))
-            .unwrap_or_else(|| panic!("group {id}"));
+    let elements = |id: &str| -> Vec<(Option<String>, Vec<P>)> {
+        let Some(start) = svg.find(&format!("id=\"{id}\"")) else {
+            // Only a sheet with flaps has this group.
+            assert_eq!(id, "flaps", "group {id}");
+            return vec![];
+        };
         let body = svg[start..].split("</g>").next().expect("the group's end");
         body.match_indices("<path")
-            .map(|(i, _)| points(&attribute(&body[i..], " d").expect("d")))
+            .map(|(i, _)| {
+                let element = body[i..].split('>').next().expect("an end");
+                let d = attribute(element, " d").expect("d");
+                (attribute(element, "class"), points(&d))
+            })
             .collect()
     };
+    let group = |id: &str| -> Vec<Vec<P>> { elements(id).into_iter().map(|e| e.1).collect() };
+    let flap = |e: &(Option<String>, Vec<P>)| e.0.as_deref() == Some("flap");
+    let (flaps, triangles): (Vec<_>, Vec<_>) = elements("guide").into_iter().partition(flap);
+    let flap_slits = group("flaps");
+    let lines = group("slits").into_iter().chain(flap_slits.iter().cloned());
     Drawing {
-        slits: group("slits").into_iter().map(|p| [p[0], p[1]]).collect(),
+        slits: lines.map(|p| [p[0], p[1]]).collect(),
+        flap_slits: flap_slits.len(),
         contours: group("contour"),
-        triangles: group("guide"),
+        triangles: triangles.into_iter().map(|e| e.1).collect(),
+        flaps: flaps.into_iter().map(|e| e.1).collect(),
         kerf: number("data-kagome-kerf-mm"),
         hinge: number("data-kagome-hinge-width-mm"),
         edge: number("data-kagome-edge-mm"),
@@ -298,4 +314,33 @@ pub fn area(drawing: &Drawing) -> f64 {
                 / 2.0
         })
         .sum()
+}
+
+/// What the outlines of the flap triangles say: sides that they share with triangles of the sheet, with each other, and
+/// faults: a flap that lies on something or hangs by fewer than two sides.
+pub fn judge_flaps(drawing: &Drawing) -> (usize, usize, Vec<String>) {
+    let same = 1e-3 * drawing.edge;
+    let middle = |t: &[P], k: usize| [0, 1].map(|c| 0.5 * (t[k][c] + t[(k + 1) % 3][c]));
+    let centre = |t: &[P]| [0, 1].map(|c| (t[0][c] + t[1][c] + t[2][c]) / 3.0);
+    let apart = |p: P, q: P| (p[0] - q[0]).hypot(p[1] - q[1]);
+    let (mut to_sheet, mut between, mut faults) = (0, 0, vec![]);
+    for (n, flap) in drawing.flaps.iter().enumerate() {
+        let here = centre(flap);
+        let mut held = 0;
+        let own = drawing.flaps.iter().enumerate().filter(|(m, _)| *m != n);
+        let all = drawing.triangles.iter().map(|t| (t, true));
+        for (other, sheet) in all.chain(own.map(|(_, t)| (t, false))) {
+            if apart(here, centre(other)) < drawing.edge / 3f64.sqrt() - same {
+                faults.push(format!("the flap at {here:.3?} lies on another triangle"));
+            }
+            let sides = (0..9).filter(|i| apart(middle(flap, i / 3), middle(other, i % 3)) < same);
+            let sides = sides.count();
+            held += sides;
+            *(if sheet { &mut to_sheet } else { &mut between }) += sides;
+        }
+        if held < 2 {
+            faults.push(format!("the flap at {here:.3?} hangs by {held} sides"));
+        }
+    }
+    (to_sheet, between / 2, faults)
 }

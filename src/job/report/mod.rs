@@ -266,9 +266,17 @@ fn sheet(out: &mut String, page: &Page<'_>) {
     let Some(svg) = page.sheet_svg.and_then(svg_element) else {
         return;
     };
+    let (words, key) = if svg.contains("id=\"flaps\"") {
+        (
+            " Shaded rows are flaps: each of their triangles doubles one on the other side of the seam, and is glued on it.",
+            "<span style=\"--c:#00a000\">slits of flaps</span>",
+        )
+    } else {
+        ("", "")
+    };
     let _ = write!(
         out,
-        "<section><h2>The sheet</h2><p class=\"lead\">What is cut: slits, then the outline. Every slit ends a hinge's width before its star.</p><figure class=\"sheet\">{svg}<div class=\"note\"><span style=\"--c:#0000ff\">slits</span><span style=\"--c:#ff0000\">outline</span></div></figure></section>"
+        "<section><h2>The sheet</h2><p class=\"lead\">What is cut: slits, then the outline. Every slit ends a hinge's width before its star.{words}</p><figure class=\"sheet\">{svg}<div class=\"note\"><span style=\"--c:#0000ff\">slits</span>{key}<span style=\"--c:#ff0000\">outline</span></div></figure></section>"
     );
 }
 
