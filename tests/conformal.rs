@@ -243,8 +243,8 @@ fn the_turning_of_a_rim_changes_the_scale_as_on_a_fan() {
             // a > 0 opens the fan upwards: the lower rim is the inner one and turns by −2πa.
             let turnings = vec![if upwards { -third } else { third }];
             let given = Singularities {
-                cones: Vec::new(),
                 turnings,
+                ..Singularities::default()
             };
             let found = ratio(&surface, &given);
             assert!(

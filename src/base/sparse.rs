@@ -73,6 +73,28 @@ impl Pattern {
         self.symbolic.row_idx().len()
     }
 
+    /// Where the value of the diagonal entry (i, i) stands in the value array.
+    pub fn diagonal(&self, i: usize) -> usize {
+        // Every column starts with it.
+        self.symbolic.col_ptr()[i] as usize
+    }
+
+    /// The product of the symmetric matrix with these `values` and the vector `x`, into `product`.
+    pub fn multiply(&self, values: &[f64], x: &[f64], product: &mut [f64]) {
+        let (ptr, rows) = (self.symbolic.col_ptr(), self.symbolic.row_idx());
+        product.fill(0.0);
+        for col in 0..self.size() {
+            let (start, end) = (ptr[col] as usize, ptr[col + 1] as usize);
+            let here = x[col];
+            let mut sum = values[start] * here;
+            for (&row, &value) in rows[start + 1..end].iter().zip(&values[start + 1..end]) {
+                sum += value * x[row as usize];
+                product[row as usize] += value * here;
+            }
+            product[col] += sum;
+        }
+    }
+
     /// Where the value of entry (i, j) stands in the value array; `None` if the pattern has no such entry.
     pub fn slot(&self, i: usize, j: usize) -> Option<usize> {
         let (col, row) = (i.min(j), i.max(j) as u32);
@@ -221,6 +243,14 @@ mod tests {
             for &(i, j) in &pairs {
                 add(i as usize, j as usize, -scale, &mut rhs);
             }
+            let mut product = vec![0.0; side * side];
+            solver.pattern().multiply(&values, &expected, &mut product);
+            let off = |a: &f64, b: &f64| (a - b).abs();
+            assert!(product.iter().zip(&rhs).all(|(a, b)| off(a, b) < 1e-12));
+            assert_eq!(
+                solver.pattern().slot(7, 7),
+                Some(solver.pattern().diagonal(7))
+            );
             solver.factor(&values).unwrap();
             solver.solve(&mut rhs);
             let worst = rhs

@@ -215,6 +215,7 @@ pub fn choose_turnings(
     let start = Singularities {
         cones: cones.to_vec(),
         turnings: Singularities::natural_turnings(surface),
+        straight: Vec::new(),
     };
     let mut best = Flattened::solve(solver, &start, options, progress)?;
     let mut improved = true;

@@ -218,6 +218,7 @@ impl Field {
         Singularities {
             cones: set.cones.iter().map(cone).collect(),
             turnings: set.turnings.clone(),
+            straight: Vec::new(),
         }
     }
 

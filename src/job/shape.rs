@@ -149,6 +149,7 @@ fn maps(
                 let given = Singularities {
                     cones: cones.to_vec(),
                     turnings: turnings.clone(),
+                    straight: Vec::new(),
                 };
                 Flattened::solve(&mut solver, &given, &first, progress)
             }
