@@ -75,6 +75,11 @@ impl Singularities {
         self.turnings.iter().map(|units| 120 * units).collect()
     }
 
+    /// The numbers of the straight rims as a person counts them, from 1.
+    pub fn straight_rims(&self) -> Vec<usize> {
+        self.straight.iter().map(|rim| rim + 1).collect()
+    }
+
     /// What Gauss–Bonnet leaves for the first rim, in units of 2π/3; on a closed surface it must be 0.
     pub fn rest(&self, surface: &Surface) -> i64 {
         let given = self

@@ -22,7 +22,8 @@ pub use cut::{Segment, cut_graph};
 pub use layout::{Layout, ScaleSummary, Transition};
 pub use metric::{Metric, MetricSolver};
 pub use propose::{
-    ConeRequest, FlattenOptions, Flattened, Sizing, choose_turnings, flatten, vertex_from_number,
+    ConeRequest, FlattenOptions, Flattened, Sizing, choose_turnings, choose_turnings_with_hems,
+    flatten, vertex_from_number,
 };
 pub use search::{SearchOptions, search};
 

@@ -92,6 +92,9 @@ pub struct LinkageChoice {
     /// How far each rim but the first turns, multiples of 120°.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rim_turnings_deg: Vec<i32>,
+    /// Rims that are straight hems, counted from 1.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub straight_rims: Vec<usize>,
 }
 
 /// `[solve]`.
@@ -124,6 +127,14 @@ pub struct ConeChoice {
 )]
 fn is_false(value: &bool) -> bool {
     !value
+}
+
+/// Rims as a person counts them, from 1, as ascending indices.
+fn hems(rims: &[usize]) -> Vec<usize> {
+    let mut hems: Vec<usize> = rims.iter().filter_map(|rim| rim.checked_sub(1)).collect();
+    hems.sort_unstable();
+    hems.dedup();
+    hems
 }
 
 impl Design {
@@ -184,6 +195,12 @@ impl Design {
             return Err(Complaint::new(
                 "linkage.rim_turnings_deg",
                 format!("has {wrong}, which is no multiple of 120"),
+            ));
+        }
+        if self.linkage.straight_rims.contains(&0) {
+            return Err(Complaint::new(
+                "linkage.straight_rims",
+                "has 0: rims are counted from 1",
             ));
         }
         ranged(
@@ -265,6 +282,7 @@ impl Design {
                     .map(|t| t / 120)
                     .collect(),
             ),
+            straight: hems(&self.linkage.straight_rims),
             orientation_deg: Some(self.linkage.orientation_deg),
             handedness: self.linkage.pattern,
             remove_at_cone: Some(self.linkage.remove_at_cone),

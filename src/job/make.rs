@@ -216,6 +216,7 @@ fn decided(
             pattern: request.handedness,
             remove_at_cone: shape.removed,
             rim_turnings_deg: shape.flat.singularities.rim_turnings_deg(),
+            straight_rims: shape.flat.singularities.straight_rims(),
         },
         solve: SolveChoice {
             solver: request.solver,

@@ -65,7 +65,9 @@ pub struct Request {
     pub cones: ConeWish,
     /// Turning of each rim but the first in units of 120°; `None`: what needs least stretch.
     pub turnings: Option<Vec<i32>>,
-    /// Lattice direction, degrees; `None`: what fits the seams.
+    /// Rims (0-based, ascending) that become straight hems.
+    pub straight: Vec<usize>,
+    /// Lattice direction, degrees; `None`: along the first straight hem, else what fits the seams.
     pub orientation_deg: Option<f64>,
     /// Slit pattern.
     pub handedness: Handedness,
@@ -95,6 +97,7 @@ impl Request {
             sizing: Sizing::Triangles(DEFAULT_TRIANGLES),
             cones: ConeWish::Auto,
             turnings: None,
+            straight: Vec::new(),
             orientation_deg: None,
             handedness: Handedness::Right,
             remove_at_cone: None,

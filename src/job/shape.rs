@@ -13,7 +13,7 @@ use crate::base::progress::Progress;
 use crate::base::units::short;
 use crate::conformal::{
     Cone, ConformalError, FlattenOptions, Flattened, MetricSolver, SearchOptions, Singularities,
-    Sizing, choose_turnings, search,
+    Sizing, choose_turnings_with_hems, search,
 };
 use crate::linkage::{Built, Linkage, LinkageOptions, build, fit};
 use crate::machine::Machine;
@@ -149,11 +149,13 @@ fn maps(
                 let given = Singularities {
                     cones: cones.to_vec(),
                     turnings: turnings.clone(),
-                    straight: Vec::new(),
+                    straight: request.straight.clone(),
                 };
                 Flattened::solve(&mut solver, &given, &first, progress)
             }
-            None => choose_turnings(&mut solver, cones, &first, progress),
+            None => {
+                choose_turnings_with_hems(&mut solver, cones, &request.straight, &first, progress)
+            }
         };
         flat.map(resized)
     };
@@ -186,7 +188,11 @@ fn maps(
                 Sizing::Triangles(count) => (surface.area() / (2.0 * count * 0.433)).sqrt(),
             };
             let wish = SearchOptions { sigma, edge_mm };
-            let sets = search(&mut solver, &wish, progress).map_err(MakeError::Conformal)?;
+            let mut sets = search(&mut solver, &wish, progress).map_err(MakeError::Conformal)?;
+            // The search knows nothing of hems: what it proposes goes where they turn by 0.
+            sets.iter_mut()
+                .for_each(|set| set.straight = request.straight.clone());
+            sets.retain(|set| set.check(surface).is_ok());
             let known: Vec<Singularities> =
                 maps.iter().map(|m| m.flat.singularities.clone()).collect();
             for set in sets.into_iter().filter(|s| !known.contains(s)).take(MAPPED) {
@@ -330,7 +336,12 @@ fn lay_out(
         .map_err(MakeError::Linkage)
     };
     let lay = |mut flat: Flattened, exact: bool| -> Result<Laid, MakeError> {
-        let mut fit = fitted(&flat, exact, request.orientation_deg)?;
+        let hem = request
+            .straight
+            .first()
+            .and_then(|&rim| surface.rims().get(rim))
+            .map(|rim| flat.layout.rim_direction(surface, rim).to_degrees());
+        let mut fit = fitted(&flat, exact, request.orientation_deg.or(hem))?;
         if !exact || request.orientation_deg.is_none() {
             // Whatever chose edge and orientation, the result is the one that these two alone would give, to the last
             // bit.
@@ -396,6 +407,13 @@ fn describe_map(flat: &Flattened, surface: &Surface, sigma: f64) -> String {
         0 => String::new(),
         _ => format!("; inner rims turning by {}", turnings.join(", ")),
     };
+    let hems: Vec<String> = flat
+        .singularities
+        .straight_rims()
+        .iter()
+        .map(|rim| format!("; rim {rim} straight"))
+        .collect();
+    let rims = rims + &hems.concat();
     format!(
         "conformal map: {cones}{rims}; λ from {} to {} (σ = {}), triangle edge {} mm",
         short(flat.scale.min, 3),
