@@ -7,10 +7,13 @@
 )]
 
 use kagome::base::progress::Silent;
+use std::f64::consts::PI;
+
 use kagome::conformal::{
-    Cone, ConeRequest, FlattenOptions, Layout, MetricSolver, Singularities, Sizing, cut_graph,
-    flatten,
+    Cone, ConeRequest, FlattenOptions, Flattened, Layout, MetricSolver, Singularities, Sizing,
+    cut_graph, flatten,
 };
+use kagome::linkage::fit;
 use kagome::mesh::{Sample, Surface, VertexId};
 
 fn sample(text: &str) -> Surface {
@@ -243,8 +246,8 @@ fn the_turning_of_a_rim_changes_the_scale_as_on_a_fan() {
             // a > 0 opens the fan upwards: the lower rim is the inner one and turns by −2πa.
             let turnings = vec![if upwards { -third } else { third }];
             let given = Singularities {
-                cones: Vec::new(),
                 turnings,
+                ..Singularities::default()
             };
             let found = ratio(&surface, &given);
             assert!(
@@ -254,6 +257,96 @@ fn the_turning_of_a_rim_changes_the_scale_as_on_a_fan() {
             );
         }
     }
+}
+
+/// How far the vertices of a rim, all their copies, are from one line; the cut's translation must be along it.
+fn off_a_line(surface: &Surface, layout: &Layout, rim: &[VertexId]) -> f64 {
+    let along = layout.rim_direction(surface, rim);
+    (0..3)
+        .map(|k| {
+            let (sin, cos) = (along + f64::from(k) * PI / 3.0).sin_cos();
+            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+            for h in surface.halfedges() {
+                if rim.contains(&surface.tail(h)) {
+                    let p = layout.corners[h.face()][h.corner()];
+                    let off = cos * p.y - sin * p.x;
+                    (low, high) = (low.min(off), high.max(off));
+                }
+            }
+            high - low
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// The end of a tube becomes a line on the sheet, and a lattice along it has a row of edges along the hem.
+#[test]
+fn a_straight_hem_lies_on_a_line_that_the_lattice_follows() {
+    // Sheared, so that nothing is straight by symmetry.
+    let (mut positions, faces) = sample("vase:faces=3000").to_arrays();
+    positions.iter_mut().for_each(|p| p.z += 0.4 * p.x);
+    let vase = Surface::new(positions, faces).unwrap();
+    let options = FlattenOptions {
+        sigma: 2.0,
+        sizing: Sizing::Triangles(400.0),
+        cone_clearance: 0.7,
+    };
+    for straight in [vec![0], vec![1], vec![0, 1]] {
+        let mut solver = MetricSolver::new(&vase).unwrap();
+        let wanted = Singularities {
+            turnings: vec![0],
+            straight: straight.clone(),
+            ..Singularities::default()
+        };
+        let flat = Flattened::solve(&mut solver, &wanted, &options, &Silent).unwrap();
+        for (i, rim) in vase.rims().iter().enumerate() {
+            let off = off_a_line(&vase, &flat.layout, rim);
+            let u = rim.iter().map(|&v| flat.metric.u[v]);
+            let (low, high) = (u.clone().fold(9.0, f64::min), u.fold(-9.0, f64::max));
+            if straight.contains(&i) {
+                assert!(off < 1e-9 && high - low > 0.01, "{off:e} mm off a line");
+            } else {
+                assert!(off > 1.0 && high == low, "{off:e} mm off a line");
+            }
+        }
+        let along = flat.layout.rim_direction(&vase, &vase.rims()[straight[0]]);
+        // Fourteen edges around: the lattice that follows the hem goes on across the seam as it is.
+        let around = flat.layout.segments[0].transition.shift.norm();
+        let edge_mm = around / 14.0;
+        let deg = Some(along.to_degrees());
+        let fitted = fit(&vase, &flat.layout, edge_mm, true, deg, &Silent).unwrap();
+        let turned = fitted
+            .layout
+            .rim_direction(&vase, &vase.rims()[straight[0]]);
+        assert!((turned.to_degrees() - fitted.orientation_deg).abs() < 1e-9);
+        assert!(
+            fitted.distortion < 1e-9,
+            "warped by {:e}",
+            fitted.distortion
+        );
+    }
+    // What turns cannot be straight, and what was solved before leaves no trace.
+    let mut solver = MetricSolver::new(&vase).unwrap();
+    let turning = Singularities {
+        turnings: vec![-1],
+        straight: vec![1],
+        ..Singularities::default()
+    };
+    let error = solver.solve(&turning, &Silent).unwrap_err().to_string();
+    assert!(
+        error.contains("rim 2") && error.contains("-120°"),
+        "{error}"
+    );
+    let plain = Singularities {
+        turnings: vec![0],
+        ..Singularities::default()
+    };
+    let hemmed = Singularities {
+        straight: vec![1],
+        ..plain.clone()
+    };
+    let before = solver.solve(&plain, &Silent).unwrap();
+    solver.solve(&hemmed, &Silent).unwrap();
+    assert_eq!(solver.solve(&plain, &Silent).unwrap().u, before.u);
 }
 
 /// A sphere with cones of +1 at the corners of an octahedron; and curvature that does not add up is refused.

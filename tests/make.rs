@@ -121,6 +121,7 @@ fn surfaces_within_reach_become_jobs() {
         vec!["sample:saddle", "--orientation", "17"],
         vec!["sample:bump", "--cone", "auto", "--remove", "4"],
         vec!["sample:vase"],
+        vec!["sample:vase", "--hem", "1", "--hem", "2"],
         vec!["sample:funnel"],
         vec!["sample:torus:t=4"],
     ] {
@@ -465,6 +466,9 @@ fn bad_input_costs_nothing() {
             &["sample:vase", "--turning", "0", "--turning", "0"],
             &["2 rim turnings", "needs 1"],
         ),
+        (&["sample:vase", "--hem", "0"], &["--hem 0", "from 1"]),
+        (&["sample:vase", "--hem", "3"], &["no rim 3", "has 2"]),
+        (&["sample:cap", "--hem", "1"], &["rim 1", "360°", "tube"]),
         (&["sample:teapot"], &["teapot", "hemisphere"]),
         (&["sample:cap", "--edge", "900"], &["--edge", "900"]),
         (&["sample:cap", "--edge", "0"], &["--edge"]),

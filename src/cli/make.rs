@@ -71,6 +71,10 @@ pub struct MakeArgs {
     /// but the first, as `inspect` lists them [default: what needs least stretch]
     #[arg(long = "turning", value_name = "DEG", allow_hyphen_values = true)]
     turnings: Vec<i32>,
+    /// Make this rim a straight hem, by its number in `inspect`: the end of a tube then lies on one line of the sheet,
+    /// and the lattice follows it; repeatable
+    #[arg(long = "hem", value_name = "N")]
+    hems: Vec<u32>,
     /// Direction of the lattice in degrees; auto fits it to the seams, without seams along the sheet's X
     #[arg(
         long,
@@ -300,6 +304,7 @@ fn decided_by_design(args: &MakeArgs) -> Vec<&'static str> {
         (!args.darts.is_empty(), "--dart"),
         (args.remove.is_some(), "--remove"),
         (!args.turnings.is_empty(), "--turning"),
+        (!args.hems.is_empty(), "--hem"),
         (args.orientation.0.is_some(), "--orientation"),
         (matches!(args.pattern, PatternArg::Left), "--pattern"),
         (args.mirror, "--mirror"),
@@ -345,6 +350,19 @@ fn turning_wish(degrees: &[i32]) -> Result<Option<Vec<i32>>, Failure> {
     Ok(Some(units).filter(|_| !degrees.is_empty()))
 }
 
+/// Straight rims, counted from 0.
+fn hem_wish(numbers: &[u32]) -> Result<Vec<usize>, Failure> {
+    if numbers.contains(&0) {
+        return Err(Failure::Bad(
+            "--hem 0: rims are counted from 1, see `kagome inspect`".into(),
+        ));
+    }
+    let mut hems: Vec<usize> = numbers.iter().map(|n| *n as usize - 1).collect();
+    hems.sort_unstable();
+    hems.dedup();
+    Ok(hems)
+}
+
 fn from_arguments(args: &MakeArgs) -> Result<Request, Failure> {
     let name = &args.surface.surface;
     let source = match name.strip_prefix("sample:") {
@@ -370,6 +388,7 @@ fn from_arguments(args: &MakeArgs) -> Result<Request, Failure> {
         cones: cone_wish(&args.cones)?,
         darts: dart_wish(&args.darts)?,
         turnings: turning_wish(&args.turnings)?,
+        straight: hem_wish(&args.hems)?,
         orientation_deg: args.orientation.0,
         handedness: match args.pattern {
             PatternArg::Right => Handedness::Right,

@@ -39,6 +39,9 @@ pub struct Singularities {
     /// Turning (total geodesic curvature, the surface on the left) of each rim but the first, in units of 2π/3: −3
     /// for a hole in a plane, 0 for the end of a cylinder. So the pattern closes around every rim.
     pub turnings: Vec<i32>,
+    /// Rims (0-based, ascending) that become straight lines: every vertex has the angle π. Only a rim that turns by 0
+    /// can, as the end of a tube; u then varies along it.
+    pub straight: Vec<usize>,
 }
 
 impl Singularities {
@@ -52,6 +55,7 @@ impl Singularities {
         Self {
             cones,
             turnings: vec![-3; surface.rims().len().saturating_sub(1)],
+            straight: Vec::new(),
         }
     }
 
@@ -71,6 +75,11 @@ impl Singularities {
         self.turnings.iter().map(|units| 120 * units).collect()
     }
 
+    /// The numbers of the straight rims as a person counts them, from 1.
+    pub fn straight_rims(&self) -> Vec<usize> {
+        self.straight.iter().map(|rim| rim + 1).collect()
+    }
+
     /// What Gauss–Bonnet leaves for the first rim, in units of 2π/3; on a closed surface it must be 0.
     pub fn rest(&self, surface: &Surface) -> i64 {
         let given = self
@@ -85,7 +94,7 @@ impl Singularities {
     ///
     /// # Errors
     /// [`ConformalError`]: a cone that is no inner vertex, is named twice or is too strong, a wrong number of
-    /// turnings, or curvatures that do not sum to what the surface has.
+    /// turnings, a straight rim that turns, or curvatures that do not sum to what the surface has.
     pub fn check(&self, surface: &Surface) -> Result<(), ConformalError> {
         let inner_rims = surface.rims().len().saturating_sub(1);
         if self.turnings.len() != inner_rims {
@@ -112,6 +121,24 @@ impl Singularities {
             }
         }
         let rest = self.rest(surface);
+        for &rim in &self.straight {
+            if rim >= surface.rims().len() {
+                return Err(ConformalError::NoSuchRim {
+                    rim: rim as u64 + 1,
+                    count: surface.rims().len(),
+                });
+            }
+            let units = match rim {
+                0 => rest,
+                inner => i64::from(self.turnings[inner - 1]),
+            };
+            if units != 0 {
+                return Err(ConformalError::HemTurns {
+                    rim: rim + 1,
+                    turning_deg: 120 * units,
+                });
+            }
+        }
         if surface.rims().is_empty() && rest != 0 {
             let wanted = 3 * surface.euler_characteristic();
             return Err(ConformalError::TotalCurvature {

@@ -12,7 +12,8 @@
 
 use nalgebra::Point3;
 
-use super::metric::LinearModel;
+use super::layout::BELOW;
+use super::linear::LinearModel;
 use super::{Cone, Metric, SearchOptions, Singularities};
 use crate::base::ids::Per;
 use crate::mesh::{Surface, VertexId};
@@ -27,8 +28,8 @@ const TOLL: f64 = 3e-4;
 const TOLL_DEAR: f64 = 6e-4;
 /// Around a cone λ is not looked at, in triangle edges on the surface.
 const CLEARANCE: f64 = 2.0;
-/// How much worse it is to ask the sheet to shrink than to stretch too far.
-const PRICE_BELOW: f64 = 5.0;
+/// How much worse it is to ask the sheet to shrink than to stretch too far, in squares.
+const PRICE_BELOW: f64 = BELOW * BELOW;
 /// Price of unevenness inside the window: decides between sets that all stay inside.
 const UNEVEN: f64 = 0.02;
 /// Room kept below σ and above 1 while searching: the model is not the map, and triangles are not points.
@@ -154,35 +155,38 @@ impl Field {
         }
     }
 
-    /// The place at a vertex, a new one if need be.
-    pub fn place(
+    /// The places at some vertices, new ones where need be, in their order.
+    pub fn places_at(
         &mut self,
         model: &mut LinearModel<'_>,
         surface: &Surface,
-        vertex: VertexId,
-    ) -> usize {
-        if let Some(known) = self.places.iter().position(|p| p.vertex == vertex) {
-            return known;
+        vertices: &[VertexId],
+    ) -> Vec<usize> {
+        let known = |field: &Self, v: VertexId| field.places.iter().position(|p| p.vertex == v);
+        let mut new: Vec<VertexId> = vertices.to_vec();
+        new.sort_unstable();
+        new.dedup();
+        new.retain(|&v| known(self, v).is_none());
+        let columns = model.cones(&new, &self.samples);
+        for (vertex, mut column) in new.into_iter().zip(columns) {
+            if let Some(even) = &self.even {
+                column.iter_mut().zip(even).for_each(|(c, e)| *c -= e);
+            }
+            let at = surface.position(vertex);
+            let reach = self.clear_mm * self.clear_mm;
+            let near = |s: &usize| (self.positions[*s] - at).norm_squared() < reach;
+            let hides = (0..self.samples.len())
+                .filter(near)
+                .map(|s| s as u32)
+                .collect();
+            self.places.push(Place {
+                vertex,
+                at,
+                column,
+                hides,
+            });
         }
-        let column = model.cone(vertex);
-        let mut column: Vec<f64> = self.samples.iter().map(|&v| column[v]).collect();
-        if let Some(even) = &self.even {
-            column.iter_mut().zip(even).for_each(|(c, e)| *c -= e);
-        }
-        let at = surface.position(vertex);
-        let reach = self.clear_mm * self.clear_mm;
-        let near = |s: &usize| (self.positions[*s] - at).norm_squared() < reach;
-        let hides = (0..self.samples.len())
-            .filter(near)
-            .map(|s| s as u32)
-            .collect();
-        self.places.push(Place {
-            vertex,
-            at,
-            column,
-            hides,
-        });
-        self.places.len() - 1
+        vertices.iter().filter_map(|&v| known(self, v)).collect()
     }
 
     pub fn singularities(&self, set: &Set) -> Singularities {
@@ -193,6 +197,7 @@ impl Field {
         Singularities {
             cones: set.cones.iter().map(cone).collect(),
             turnings: set.turnings.clone(),
+            straight: Vec::new(),
         }
     }
 

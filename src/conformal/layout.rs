@@ -357,6 +357,23 @@ impl Layout {
         self.spread_transitions(surface);
     }
 
+    /// Direction of a rim in the chart, radians, modulo 60°: that of its edges in the mean, which for a straight hem is
+    /// that of all. Modulo 60° it is the same on both sides of the cut, and all that a lattice needs.
+    pub fn rim_direction(&self, surface: &Surface, rim: &[VertexId]) -> f64 {
+        let sixfold: Complex<f64> = rim
+            .iter()
+            .filter_map(|&v| surface.around(v).next())
+            .map(|h| {
+                let flat = &self.corners[h.face()];
+                let edge = flat[(h.corner() + 1) % 3] - flat[h.corner()];
+                let edge = Complex::new(edge.x, edge.y);
+                let length = edge.modulus().max(f64::MIN_POSITIVE);
+                (edge / length).powi(6) * length
+            })
+            .sum();
+        sixfold.argument() / 6.0
+    }
+
     fn vertex_position(&self, surface: &Surface, vertex: VertexId) -> Point2<f64> {
         surface
             .around(vertex)

@@ -6,15 +6,17 @@
 //! inequality fails the angles are extended by 0 and π, which keeps the function convex and once differentiable.
 //!
 //! On each rim u is constant, which gives the least area distortion (same paper, appendix E). All vertices of a rim share
-//! one unknown, and the sum of their equations is the rim's turning. The first rim, or one vertex of a closed surface,
-//! has u = 0: the function does not see a shift of u, and Gauss–Bonnet makes that last equation true.
+//! one unknown, and the sum of their equations is the rim's turning. A straight rim instead has an unknown and the angle
+//! π at each vertex. The first rim that is not straight, or one vertex where there is none, has u = 0: the function does
+//! not see a shift of u, and Gauss–Bonnet makes that last equation true.
 
 use std::f64::consts::PI;
 
+pub(super) use super::linear::LinearModel;
+use super::system::{System, Unknowns, dot, norm};
 use super::{CURVATURE_UNIT, ConformalError, Singularities};
-use crate::base::ids::Per;
+use crate::base::ids::{Id as _, Per};
 use crate::base::progress::Progress;
-use crate::base::sparse::{Cholesky, FactorError, Pattern};
 use crate::mesh::{FaceId, Surface, VertexId};
 
 /// Largest angle-sum error accepted, radians. Angle sums of a fan of six carry a rounding error of about 10⁻¹⁵ each;
@@ -29,10 +31,16 @@ const ANGLE_ACCEPTED: f64 = 1e-8;
 /// Newton steps before giving up. Good meshes take 2–7, meshes with broken triangles up to some dozens.
 const MAX_STEPS: usize = 200;
 
+/// The last step is solved this much better than the tolerance asks, so that it is the last.
+const SPARE: f64 = 0.03;
+
+/// A step is solved at least as well as this, relative to the gradient.
+const LOOSEST: f64 = 0.1;
+
 /// The result of a solve.
 #[derive(Clone, Debug)]
 pub struct Metric {
-    /// Logarithmic factor u per vertex: l̃ᵢⱼ = e^{(uᵢ+uⱼ)/2} lᵢⱼ; constant on each rim, 0 on the first.
+    /// Logarithmic factor u per vertex: l̃ᵢⱼ = e^{(uᵢ+uⱼ)/2} lᵢⱼ; constant on each rim that is not kept straight, 0 on the first such.
     pub u: Per<VertexId, f64>,
     /// Newton steps taken.
     pub steps: usize,
@@ -80,41 +88,77 @@ pub(super) fn angles(lengths: [f64; 3]) -> ([f64; 3], [f64; 3], bool) {
     )
 }
 
-/// Solves for the metric of one surface with different singularities; the symbolic factor is computed once.
+/// Solves for the metric of one surface with different singularities. The order of elimination and the factor at the
+/// surface's own metric are computed once; results do not depend on what was solved before.
 pub struct MetricSolver<'a> {
     surface: &'a Surface,
-    /// Unknown of each vertex: its own inside, one for each rim; [`NONE`] where u = 0.
-    row: Per<VertexId, u32>,
-    rows: usize,
-    /// Logarithms of the side lengths.
-    log_length: Per<FaceId, [f64; 3]>,
-    /// Value slots: per face three diagonal entries (corner k) and three for side k, [`NONE`] where there is none.
-    slots: Per<FaceId, [u32; 6]>,
-    cholesky: Cholesky,
+    /// The rims that the system below keeps straight.
+    straight: Vec<usize>,
+    unknowns: Unknowns,
+    system: System,
 }
 
-const NONE: u32 = u32::MAX;
-
-/// The unknown of every vertex, and how many there are.
-fn unknowns(surface: &Surface) -> (Per<VertexId, u32>, usize) {
-    let mut row = Per::filled(surface.positions().len(), NONE);
-    let mut rows = 0;
+/// The unknown of every vertex: its own inside and on straight rims, one for each other rim. One of those, or a vertex,
+/// is held at 0.
+fn unknowns(surface: &Surface, straight: &[usize]) -> Unknowns {
+    let vertices = surface.positions().len();
+    let mut of = vec![u32::MAX; vertices];
+    let mut count = 0;
     let mut next = || {
-        rows += 1;
-        rows as u32 - 1
+        count += 1;
+        count - 1
     };
-    // Without a rim the first vertex is held.
-    let held = usize::from(surface.rims().is_empty());
-    for vertex in surface.positions().ids().skip(held) {
-        if !surface.on_rim(vertex) {
-            row[vertex] = next();
+    let mut held: Option<&[VertexId]> = None;
+    let mut shared = Vec::new();
+    for (i, rim) in surface.rims().iter().enumerate() {
+        if straight.contains(&i) {
+            continue;
         }
+        match held {
+            None => held = Some(rim),
+            Some(_) => shared.push(rim),
+        }
+        rim.iter().for_each(|v| of[v.index()] = 0);
     }
-    for rim in surface.rims().iter().skip(1) {
-        let shared = next();
-        rim.iter().for_each(|&vertex| row[vertex] = shared);
+    let first = [VertexId::from_index(0)];
+    let held = held.unwrap_or(&first);
+    held.iter().for_each(|v| of[v.index()] = 0);
+    for row in of.iter_mut().filter(|row| **row == u32::MAX) {
+        *row = next();
     }
-    (row, rows)
+    for rim in shared {
+        let one = next();
+        rim.iter().for_each(|v| of[v.index()] = one);
+    }
+    held.iter().for_each(|v| of[v.index()] = count);
+    Unknowns {
+        of,
+        count: count as usize,
+    }
+}
+
+/// Lengths of all faces' sides.
+fn side_lengths(surface: &Surface) -> Result<Vec<[f64; 3]>, ConformalError> {
+    let mut all = Vec::with_capacity(surface.faces().len());
+    for (face, v) in surface.faces().iter_ids() {
+        let p = surface.corners(face);
+        let lengths: [f64; 3] = std::array::from_fn(|k| (p[(k + 1) % 3] - p[k]).norm());
+        if let Some(k) = (0..3).find(|&k| lengths[k] <= 0.0) {
+            return Err(ConformalError::ZeroLength {
+                tail: v[k],
+                head: v[(k + 1) % 3],
+            });
+        }
+        all.push(lengths);
+    }
+    Ok(all)
+}
+
+fn system(surface: &Surface, unknowns: &Unknowns) -> Result<System, ConformalError> {
+    let lengths = side_lengths(surface)?;
+    let faces = surface.faces().iter().map(|v| v.map(|v| v.0));
+    let on_rim = |v| surface.on_rim(VertexId(v));
+    Ok(System::new(unknowns, faces, lengths, on_rim)?)
 }
 
 impl<'a> MetricSolver<'a> {
@@ -123,58 +167,12 @@ impl<'a> MetricSolver<'a> {
     /// # Errors
     /// [`ConformalError::ZeroLength`] for an edge without length, or out of memory.
     pub fn new(surface: &'a Surface) -> Result<Self, ConformalError> {
-        let (row, rows) = unknowns(surface);
-        let mut log_length = Vec::with_capacity(surface.faces().len());
-        for (face, v) in surface.faces().iter_ids() {
-            let p = surface.corners(face);
-            let mut logs = [0.0; 3];
-            for k in 0..3 {
-                let length = (p[(k + 1) % 3] - p[k]).norm();
-                if length <= 0.0 {
-                    return Err(ConformalError::ZeroLength {
-                        tail: v[k],
-                        head: v[(k + 1) % 3],
-                    });
-                }
-                logs[k] = length.ln();
-            }
-            log_length.push(logs);
-        }
-        let inner_edges = surface.edges().filter_map(|h| {
-            let (i, j) = (row[surface.tail(h)], row[surface.head(h)]);
-            (i != NONE && j != NONE && i != j).then_some((i, j))
-        });
-        let cholesky = Cholesky::new(Pattern::new(rows, inner_edges))?;
-        let slot = |i: u32, j: u32| -> u32 {
-            if i == NONE || j == NONE {
-                return NONE;
-            }
-            cholesky
-                .pattern()
-                .slot(i as usize, j as usize)
-                .map_or(NONE, |s| s as u32)
-        };
-        let slots = surface
-            .faces()
-            .iter()
-            .map(|v| {
-                let r = v.map(|v| row[v]);
-                std::array::from_fn(|k| {
-                    if k < 3 {
-                        slot(r[k], r[k])
-                    } else {
-                        slot(r[k - 3], r[(k - 2) % 3])
-                    }
-                })
-            })
-            .collect();
+        let unknowns = unknowns(surface, &[]);
         Ok(Self {
             surface,
-            row,
-            rows,
-            log_length: Per::new(log_length),
-            slots,
-            cholesky,
+            straight: Vec::new(),
+            system: system(surface, &unknowns)?,
+            unknowns,
         })
     }
 
@@ -183,52 +181,14 @@ impl<'a> MetricSolver<'a> {
         self.surface
     }
 
-    /// Gradient Θ − Σα at `u` into `gradient`, Hessian values into `hessian`; returns the number of broken faces.
-    fn evaluate(
-        &self,
-        u: &[f64],
-        target: &[f64],
-        gradient: &mut [f64],
-        hessian: &mut [f64],
-    ) -> usize {
-        gradient.copy_from_slice(target);
-        hessian.fill(0.0);
-        let mut broken = 0;
-        for (face, v) in self.surface.faces().iter_ids() {
-            let row = v.map(|v| self.row[v]);
-            if row == [NONE; 3] {
-                continue;
-            }
-            let at = row.map(|r| if r == NONE { 0.0 } else { u[r as usize] });
-            let logs = &self.log_length[face];
-            let lengths =
-                std::array::from_fn(|k| (logs[k] + 0.5 * (at[k] + at[(k + 1) % 3])).exp());
-            let (angle, cot, bad) = angles(lengths);
-            broken += usize::from(bad);
-            // `angle[k]` lies opposite side k, that is at corner k + 2.
-            for k in 0..3 {
-                if row[(k + 2) % 3] != NONE {
-                    gradient[row[(k + 2) % 3] as usize] -= angle[k];
-                }
-            }
-            let slots = &self.slots[face];
-            for k in 0..3 {
-                // Along a rim both ends are one unknown, and their difference is nothing.
-                if row[k] == row[(k + 1) % 3] {
-                    continue;
-                }
-                let half = 0.5 * cot[k];
-                for corner in [k, (k + 1) % 3] {
-                    if slots[corner] != NONE {
-                        hessian[slots[corner] as usize] += half;
-                    }
-                }
-                if slots[3 + k] != NONE {
-                    hessian[slots[3 + k] as usize] -= half;
-                }
-            }
+    /// Has the equations for these straight rims at hand.
+    fn straighten(&mut self, straight: &[usize]) -> Result<(), ConformalError> {
+        if self.straight != straight {
+            let unknowns = unknowns(self.surface, straight);
+            self.system = system(self.surface, &unknowns)?;
+            (self.unknowns, self.straight) = (unknowns, straight.to_vec());
         }
-        broken
+        Ok(())
     }
 
     /// The metric with the given singularities, flat everywhere else.
@@ -241,81 +201,33 @@ impl<'a> MetricSolver<'a> {
         progress: &dyn Progress,
     ) -> Result<Metric, ConformalError> {
         singularities.check(self.surface)?;
+        self.straighten(&singularities.straight)?;
         let target = self.targets(singularities);
-        let norm = |g: &[f64]| g.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-        let mut u = vec![0.0; self.rows];
-        let (mut gradient, mut trial_gradient) = (vec![0.0; self.rows], vec![0.0; self.rows]);
-        let (mut step, mut trial) = (vec![0.0; self.rows], vec![0.0; self.rows]);
-        let mut hessian = vec![0.0; self.cholesky.pattern().entries()];
-        let mut broken = self.evaluate(&u, &target, &mut gradient, &mut hessian);
-        let mut residual = norm(&gradient);
-        let mut steps = 0;
-        while residual > ANGLE_TOLERANCE && steps < MAX_STEPS {
-            progress.check()?;
-            self.factor(&mut hessian)?;
-            for (s, g) in step.iter_mut().zip(&gradient) {
-                *s = -g;
-            }
-            self.cholesky.solve(&mut step);
-            let slope: f64 = gradient.iter().zip(&step).map(|(g, s)| g * s).sum();
-            // The function is convex along the line, so its slope tells everything: a step is good while the slope has
-            // not turned clearly positive, and no function value, with its cancellation, is ever needed.
-            let mut length = 1.0;
-            let improved = loop {
-                for ((t, u), s) in trial.iter_mut().zip(&u).zip(&step) {
-                    *t = u + length * s;
-                }
-                broken = self.evaluate(&trial, &target, &mut trial_gradient, &mut hessian);
-                let trial_slope: f64 = trial_gradient.iter().zip(&step).map(|(g, s)| g * s).sum();
-                let rest = norm(&trial_gradient);
-                if rest.is_finite() && (trial_slope <= -0.1 * slope || rest < 0.5 * residual) {
-                    break true;
-                }
-                // Where a straight line between the two slopes crosses zero.
-                let crossing = slope / (slope - trial_slope);
-                length *= if crossing.is_finite() {
-                    crossing.clamp(0.1, 0.5)
-                } else {
-                    0.1
-                };
-                if length < 1e-10 {
-                    break false;
-                }
-            };
-            steps += 1;
-            let rest = norm(&trial_gradient);
-            // At the accuracy of rounding a step no longer improves anything: keep the better point and stop.
-            if !improved || (residual < 1e-9 && rest >= residual) {
-                break;
-            }
-            std::mem::swap(&mut u, &mut trial);
-            std::mem::swap(&mut gradient, &mut trial_gradient);
-            residual = rest;
-        }
-        if residual > ANGLE_ACCEPTED {
-            let worst = (0..self.rows)
-                .max_by(|&a, &b| gradient[a].abs().total_cmp(&gradient[b].abs()))
+        let solved = newton(&mut self.system, &target, progress)?;
+        if solved.residual > ANGLE_ACCEPTED {
+            let rows = self.system.count() as u32;
+            let worst = (0..rows)
+                .max_by(|&a, &b| {
+                    let off = |row: u32| solved.gradient[row as usize].abs();
+                    off(a).total_cmp(&off(b))
+                })
                 .unwrap_or(0);
-            let vertex = self
-                .row
-                .iter_ids()
-                .find(|(_, r)| **r == worst as u32)
-                .map_or(VertexId(0), |(v, _)| v);
+            let at = self.unknowns.of.iter().position(|&row| row == worst);
+            let vertex = VertexId::from_index(at.unwrap_or(0));
             return Err(ConformalError::NotConverged {
-                steps,
-                residual_deg: residual.to_degrees(),
+                steps: solved.steps,
+                residual_deg: solved.residual.to_degrees(),
                 vertex,
                 position: self.surface.position(vertex).into(),
             });
         }
-        let u = spread(&self.row, &u);
         let mut metric = Metric {
-            u,
-            steps,
-            residual,
+            u: spread(&self.unknowns, &solved.u),
+            steps: solved.steps,
+            residual: solved.residual,
             broken: Vec::new(),
         };
-        if broken > 0 {
+        if solved.broken > 0 {
             metric.broken = self
                 .surface
                 .faces()
@@ -328,150 +240,140 @@ impl<'a> MetricSolver<'a> {
 
     /// What the angles of every unknown sum to: around a vertex, or along a rim.
     fn targets(&self, singularities: &Singularities) -> Vec<f64> {
-        let mut target = vec![2.0 * PI; self.rows];
+        let row = |v: VertexId| self.unknowns.of[v.index()] as usize;
+        let mut target = vec![2.0 * PI; self.system.count() + 1];
         for cone in &singularities.cones {
-            let row = self.row[cone.vertex];
-            if row != NONE {
-                target[row as usize] = cone.angle();
-            }
+            target[row(cone.vertex)] = cone.angle();
         }
-        let inner_rims = self.surface.rims().iter().skip(1);
-        for (rim, &turning) in inner_rims.zip(&singularities.turnings) {
-            target[self.row[rim[0]] as usize] =
-                PI * rim.len() as f64 - CURVATURE_UNIT * f64::from(turning);
+        let rest = singularities.rest(self.surface) as f64;
+        let turnings = singularities.turnings.iter().map(|&t| f64::from(t));
+        let turnings = std::iter::once(rest).chain(turnings);
+        for ((i, rim), turning) in self.surface.rims().iter().enumerate().zip(turnings) {
+            if singularities.straight.contains(&i) {
+                rim.iter().for_each(|&v| target[row(v)] = PI);
+            } else {
+                target[row(rim[0])] = PI * rim.len() as f64 - CURVATURE_UNIT * turning;
+            }
         }
         target
     }
 
-    /// Factors the Hessian; where broken triangles leave it singular, a growing multiple of its diagonal is added,
-    /// which shortens the step but keeps it downhill.
-    fn factor(&mut self, hessian: &mut [f64]) -> Result<(), ConformalError> {
-        let mut shift = 0.0;
-        let diagonal: Vec<usize> = (0..self.rows)
-            .filter_map(|i| self.cholesky.pattern().slot(i, i))
-            .collect();
-        let mean =
-            diagonal.iter().map(|&s| hessian[s].abs()).sum::<f64>() / self.rows.max(1) as f64;
-        loop {
-            match self.cholesky.factor(hessian) {
-                Err(FactorError::NotPositiveDefinite) if shift < 1e6 => {
-                    let next = if shift == 0.0 { 1e-10 } else { shift * 100.0 };
-                    for &slot in &diagonal {
-                        hessian[slot] += (next - shift) * mean.max(1e-30);
-                    }
-                    shift = next;
-                }
-                other => return Ok(other?),
-            }
-        }
-    }
-}
-
-/// The first Newton step from the surface's own metric, for all singularities at once: u is linear in them.
-pub(super) struct LinearModel<'s> {
-    surface: &'s Surface,
-    row: &'s Per<VertexId, u32>,
-    cholesky: &'s mut Cholesky,
-    start: Per<VertexId, f64>,
-    rhs: Vec<f64>,
-}
-
-impl MetricSolver<'_> {
     /// The linear model around a metric that has been found: what its cones and rims add, to first order.
     pub(super) fn linear_model_at(
         &mut self,
         metric: &Metric,
     ) -> Result<LinearModel<'_>, ConformalError> {
-        let mut u = vec![0.0; self.rows];
-        for (vertex, &row) in self.row.iter_ids() {
-            if row != NONE {
-                u[row as usize] = metric.u[vertex];
-            }
+        let mut u = vec![0.0; self.system.count() + 1];
+        for (value, &row) in metric.u.iter().zip(&self.unknowns.of) {
+            u[row as usize] = *value;
         }
-        let target = vec![0.0; self.rows];
-        let mut gradient = vec![0.0; self.rows];
-        let mut hessian = vec![0.0; self.cholesky.pattern().entries()];
-        self.evaluate(&u, &target, &mut gradient, &mut hessian);
-        self.factor(&mut hessian)?;
-        Ok(LinearModel {
-            surface: self.surface,
-            row: &self.row,
-            start: metric.u.clone(),
-            cholesky: &mut self.cholesky,
-            rhs: gradient,
-        })
+        LinearModel::around(self.surface, &self.unknowns, &mut self.system, &u)
     }
 
     /// The linear model: one factorisation of the surface's cotangent Laplacian.
     pub(super) fn linear_model(&mut self) -> Result<LinearModel<'_>, ConformalError> {
+        self.linear_model_with_hems(&[])
+    }
+
+    /// The same where these rims (0-based, ascending) are straight.
+    pub(super) fn linear_model_with_hems(
+        &mut self,
+        straight: &[usize],
+    ) -> Result<LinearModel<'_>, ConformalError> {
+        self.straighten(straight)?;
         let none = Singularities {
             cones: Vec::new(),
             turnings: vec![0; self.surface.rims().len().saturating_sub(1)],
+            straight: straight.to_vec(),
         };
         let target = self.targets(&none);
-        let mut gradient = vec![0.0; self.rows];
-        let mut hessian = vec![0.0; self.cholesky.pattern().entries()];
-        self.evaluate(&vec![0.0; self.rows], &target, &mut gradient, &mut hessian);
-        self.factor(&mut hessian)?;
-        gradient.iter_mut().for_each(|g| *g = -*g);
-        self.cholesky.solve(&mut gradient);
-        Ok(LinearModel {
-            surface: self.surface,
-            row: &self.row,
-            start: spread(&self.row, &gradient),
-            cholesky: &mut self.cholesky,
-            rhs: gradient,
-        })
+        LinearModel::new(self.surface, &self.unknowns, &mut self.system, &target)
     }
 }
 
-/// The value of every vertex' unknown; 0 where it has none.
-fn spread(row: &Per<VertexId, u32>, values: &[f64]) -> Per<VertexId, f64> {
-    row.iter()
-        .map(|&r| if r == NONE { 0.0 } else { values[r as usize] })
+/// Where Newton's method ended.
+struct Solved {
+    u: Vec<f64>,
+    gradient: Vec<f64>,
+    steps: usize,
+    residual: f64,
+    broken: usize,
+}
+
+/// Newton's method with line search.
+fn newton(
+    system: &mut System,
+    target: &[f64],
+    progress: &dyn Progress,
+) -> Result<Solved, ConformalError> {
+    let zeros = || vec![0.0; system.count() + 1];
+    let (mut u, mut gradient, mut step) = (zeros(), zeros(), zeros());
+    let (mut trial, mut trial_gradient) = (zeros(), zeros());
+    let mut broken = system.evaluate(&u, target, &mut gradient);
+    let mut residual = norm(&gradient);
+    let mut steps = 0;
+    // The gradient that a step leaves is about the square of that before it: no use in solving better than that.
+    let mut forcing: f64 = LOOSEST;
+    while residual > ANGLE_TOLERANCE && steps < MAX_STEPS {
+        progress.check()?;
+        if steps == 0 {
+            system.first_step(&gradient, &mut step)?;
+        } else {
+            let enough = SPARE * ANGLE_TOLERANCE / residual;
+            system.step(&gradient, forcing.max(enough), &mut step)?;
+        }
+        let slope = dot(&gradient, &step);
+        // The function is convex along the line, so its slope tells everything: a step is good while the slope has not
+        // turned clearly positive, and no function value, with its cancellation, is ever needed.
+        let mut length = 1.0;
+        let improved = loop {
+            for ((t, u), s) in trial.iter_mut().zip(&u).zip(&step) {
+                *t = u + length * s;
+            }
+            broken = system.evaluate(&trial, target, &mut trial_gradient);
+            let trial_slope = dot(&trial_gradient, &step);
+            let rest = norm(&trial_gradient);
+            if rest.is_finite() && (trial_slope <= -0.1 * slope || rest < 0.5 * residual) {
+                break true;
+            }
+            // Where a straight line between the two slopes crosses zero.
+            let crossing = slope / (slope - trial_slope);
+            length *= if crossing.is_finite() {
+                crossing.clamp(0.1, 0.5)
+            } else {
+                0.1
+            };
+            if length < 1e-10 {
+                break false;
+            }
+        };
+        steps += 1;
+        let rest = norm(&trial_gradient);
+        // At the accuracy of rounding a step no longer improves anything: keep the better point and stop.
+        if !improved || (residual < 1e-9 && rest >= residual) {
+            break;
+        }
+        std::mem::swap(&mut u, &mut trial);
+        std::mem::swap(&mut gradient, &mut trial_gradient);
+        forcing = (rest / residual).powi(2).clamp(1e-9, LOOSEST);
+        residual = rest;
+    }
+    Ok(Solved {
+        u,
+        gradient,
+        steps,
+        residual,
+        broken,
+    })
+}
+
+/// The value of every vertex' unknown; 0 where it is held.
+pub(super) fn spread(unknowns: &Unknowns, values: &[f64]) -> Per<VertexId, f64> {
+    unknowns
+        .of
+        .iter()
+        .map(|&row| values[row as usize])
         .collect()
-}
-
-impl LinearModel<'_> {
-    /// u without cones, all inner rims turning by 0.
-    pub fn start(&self) -> &Per<VertexId, f64> {
-        &self.start
-    }
-
-    /// What a cone of +1 at a vertex adds.
-    pub fn cone(&mut self, vertex: VertexId) -> Per<VertexId, f64> {
-        let row = self.row[vertex];
-        self.column(|rhs| {
-            if row != NONE {
-                rhs[row as usize] = CURVATURE_UNIT;
-            }
-        })
-    }
-
-    /// What one more unit of turning at inner rim `rim` (1, 2, …) adds.
-    pub fn rim(&mut self, rim: usize) -> Per<VertexId, f64> {
-        self.cone(self.surface.rims()[rim][0])
-    }
-
-    /// What one unit of curvature adds that is spread in proportion to `weight`.
-    pub fn spread(&mut self, weight: &Per<VertexId, f64>) -> Per<VertexId, f64> {
-        let total: f64 = weight.iter().sum();
-        let row = self.row;
-        self.column(|rhs| {
-            for (w, &r) in weight.iter().zip(row.iter()) {
-                if r != NONE {
-                    rhs[r as usize] += CURVATURE_UNIT * w / total;
-                }
-            }
-        })
-    }
-
-    fn column(&mut self, fill: impl FnOnce(&mut [f64])) -> Per<VertexId, f64> {
-        self.rhs.fill(0.0);
-        fill(&mut self.rhs);
-        self.cholesky.solve(&mut self.rhs);
-        spread(self.row, &self.rhs)
-    }
 }
 
 #[cfg(test)]

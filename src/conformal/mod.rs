@@ -13,10 +13,12 @@ mod dart;
 mod distance;
 mod field;
 mod layout;
+mod linear;
 mod metric;
 mod paths;
 mod propose;
 mod search;
+mod system;
 
 pub use cone::{CURVATURE_UNIT, Cone, Singularities};
 pub use cut::{Segment, cut_graph};
@@ -24,7 +26,8 @@ pub use dart::{Dart, Patch, around_handles, patches, slit_along, to_goals};
 pub use layout::{Layout, ScaleSummary, Transition};
 pub use metric::{Metric, MetricSolver};
 pub use propose::{
-    ConeRequest, FlattenOptions, Flattened, Sizing, choose_turnings, flatten, vertex_from_number,
+    ConeRequest, FlattenOptions, Flattened, Sizing, choose_turnings, choose_turnings_with_hems,
+    flatten, vertex_from_number,
 };
 pub use search::{SearchOptions, search};
 
@@ -80,6 +83,24 @@ pub enum ConformalError {
         given: usize,
         /// Needed.
         wanted: usize,
+    },
+    /// No such rim.
+    #[error("there is no rim {rim}: the surface has {count}; `inspect` lists them")]
+    NoSuchRim {
+        /// Asked for, counted from 1.
+        rim: u64,
+        /// Rims there are.
+        count: usize,
+    },
+    /// A rim that cannot be straight.
+    #[error(
+        "rim {rim} cannot become a straight hem: with these cones and turnings it turns by {turning_deg}°, and only a rim that turns by 0°, as the end of a tube, can lie straight: choose another rim, or other cones and turnings"
+    )]
+    HemTurns {
+        /// The rim, counted from 1.
+        rim: usize,
+        /// How far it turns, degrees.
+        turning_deg: i64,
     },
     /// A closed surface whose cones do not carry its curvature.
     #[error(

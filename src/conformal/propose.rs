@@ -211,11 +211,39 @@ pub fn choose_turnings(
     options: &FlattenOptions,
     progress: &dyn Progress,
 ) -> Result<Flattened, ConformalError> {
+    choose_turnings_with_hems(solver, cones, &[], options, progress)
+}
+
+/// As [`choose_turnings`], these rims (0-based, ascending) being straight hems, which turn by 0.
+///
+/// # Errors
+/// [`ConformalError`]: impossible cones or hems, no convergence, interruption.
+pub fn choose_turnings_with_hems(
+    solver: &mut MetricSolver<'_>,
+    cones: &[Cone],
+    straight: &[usize],
+    options: &FlattenOptions,
+    progress: &dyn Progress,
+) -> Result<Flattened, ConformalError> {
     let surface = solver.surface();
-    let start = Singularities {
+    let mut start = Singularities {
         cones: cones.to_vec(),
         turnings: Singularities::natural_turnings(surface),
+        straight: straight.to_vec(),
     };
+    let is_straight = |rim: usize| straight.contains(&(rim + 1));
+    let inner = 0..start.turnings.len();
+    inner
+        .clone()
+        .filter(|&rim| is_straight(rim))
+        .for_each(|rim| start.turnings[rim] = 0);
+    if straight.contains(&0) {
+        // The first rim leaves nothing to itself: another one takes it.
+        let rest = start.rest(surface) as i32;
+        if let Some(rim) = inner.rev().find(|&rim| !is_straight(rim)) {
+            start.turnings[rim] += rest;
+        }
+    }
     let mut best = Flattened::solve(solver, &start, options, progress)?;
     let mut improved = true;
     while improved {
@@ -224,6 +252,10 @@ pub fn choose_turnings(
             for step in [-1, 1] {
                 let mut tried = best.singularities.clone();
                 tried.turnings[rim] += step;
+                // A straight rim must go on turning by 0.
+                if tried.check(surface).is_err() {
+                    continue;
+                }
                 let flat = Flattened::solve(solver, &tried, options, progress)?;
                 if flat.scale.ratio() < best.scale.ratio() {
                     best = flat;

@@ -104,10 +104,8 @@ impl Searcher {
         let mut model = solver.linear_model()?;
         let places = candidates(surface, model.start(), options.edge_mm);
         let mut field = Field::new(surface, &mut model, options);
-        for &place in &places {
-            progress.check()?;
-            field.place(&mut model, surface, place);
-        }
+        progress.check()?;
+        field.places_at(&mut model, surface, &places);
         let natural = || Singularities::natural_turnings(surface);
         Ok(Self {
             apart_mm: APART * options.edge_mm,
@@ -308,10 +306,10 @@ fn polish(
         cones: Vec::new(),
         turnings: set.turnings.clone(),
     };
-    for cone in &set.cones {
-        let place = field.place(&mut model, surface, cone.vertex);
-        best.cones.push((place, cone.units));
-    }
+    let vertices: Vec<VertexId> = set.cones.iter().map(|c| c.vertex).collect();
+    let places = field.places_at(&mut model, surface, &vertices);
+    best.cones
+        .extend(places.into_iter().zip(set.cones.iter().map(|c| c.units)));
     field.anchor(&best, &metric);
     let mut price = Pricer::new(&field, &best).price();
     let spacing = (surface.area() / CANDIDATES as f64).sqrt();
@@ -321,11 +319,16 @@ fn polish(
     loop {
         for _ in 0..ROUNDS {
             let before = price;
-            for cone in 0..best.cones.len() {
-                progress.check()?;
-                let from = field.places[best.cones[cone].0].vertex;
-                for vertex in star(surface, from, edges) {
-                    let place = field.place(&mut model, surface, vertex);
+            progress.check()?;
+            let stars: Vec<Vec<VertexId>> = best
+                .cones
+                .iter()
+                .map(|c| star(surface, field.places[c.0].vertex, edges))
+                .collect();
+            // All at once: columns solved together are cheap.
+            field.places_at(&mut model, surface, &stars.concat());
+            for (cone, star) in stars.iter().enumerate() {
+                for place in field.places_at(&mut model, surface, star) {
                     let apart = best.cones.iter().enumerate().all(|(i, c)| {
                         let gap = (field.places[c.0].at - field.places[place].at).norm();
                         i == cone || gap >= APART * options.edge_mm

@@ -98,6 +98,9 @@ pub struct LinkageChoice {
     /// Doubled rows along the seams.
     #[serde(default)]
     pub flaps: FlapWish,
+    /// Rims that are straight hems, counted from 1.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub straight_rims: Vec<usize>,
 }
 
 /// `[solve]`.
@@ -142,6 +145,14 @@ pub struct DartChoice {
 )]
 fn is_false(value: &bool) -> bool {
     !value
+}
+
+/// Rims as a person counts them, from 1, as ascending indices.
+fn hems(rims: &[usize]) -> Vec<usize> {
+    let mut hems: Vec<usize> = rims.iter().filter_map(|rim| rim.checked_sub(1)).collect();
+    hems.sort_unstable();
+    hems.dedup();
+    hems
 }
 
 impl Design {
@@ -202,6 +213,12 @@ impl Design {
             return Err(Complaint::new(
                 "linkage.rim_turnings_deg",
                 format!("has {wrong}, which is no multiple of 120"),
+            ));
+        }
+        if self.linkage.straight_rims.contains(&0) {
+            return Err(Complaint::new(
+                "linkage.straight_rims",
+                "has 0: rims are counted from 1",
             ));
         }
         ranged(
@@ -306,6 +323,7 @@ impl Design {
                     .map(|t| t / 120)
                     .collect(),
             ),
+            straight: hems(&self.linkage.straight_rims),
             orientation_deg: Some(self.linkage.orientation_deg),
             handedness: self.linkage.pattern,
             remove_at_cone: Some(self.linkage.remove_at_cone),

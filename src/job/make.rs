@@ -221,6 +221,7 @@ fn decided(
             remove_at_cone: shape.removed,
             rim_turnings_deg: shape.flat.singularities.rim_turnings_deg(),
             flaps: request.flaps,
+            straight_rims: shape.flat.singularities.straight_rims(),
         },
         solve: SolveChoice {
             solver: request.solver,

@@ -8,7 +8,7 @@ use super::request::Request;
 use crate::base::progress::Progress;
 use crate::conformal::{
     Cone, ConformalError, Dart, FlattenOptions, Flattened, MetricSolver, SearchOptions,
-    Singularities, Sizing, choose_turnings, search, slit_along,
+    Singularities, Sizing, choose_turnings_with_hems, search, slit_along,
 };
 use crate::mesh::Surface;
 
@@ -97,10 +97,13 @@ pub(crate) fn maps(
                 let given = Singularities {
                     cones: cones.to_vec(),
                     turnings: turnings.clone(),
+                    straight: request.straight.clone(),
                 };
                 Flattened::solve(&mut solver, &given, &first, progress)
             }
-            None => choose_turnings(&mut solver, cones, &first, progress),
+            None => {
+                choose_turnings_with_hems(&mut solver, cones, &request.straight, &first, progress)
+            }
         };
         flat.map(resized)
     };
@@ -137,7 +140,11 @@ pub(crate) fn maps(
                 edge_mm,
                 turnings: request.turnings.clone(),
             };
-            let sets = search(&mut solver, &wish, progress).map_err(MakeError::Conformal)?;
+            let mut sets = search(&mut solver, &wish, progress).map_err(MakeError::Conformal)?;
+            // The search knows nothing of hems: what it proposes goes where they turn by 0.
+            sets.iter_mut()
+                .for_each(|set| set.straight = request.straight.clone());
+            sets.retain(|set| set.check(surface).is_ok());
             let known: Vec<Singularities> =
                 maps.iter().map(|m| m.flat.singularities.clone()).collect();
             for set in sets.into_iter().filter(|s| !known.contains(s)).take(MAPPED) {

@@ -88,7 +88,9 @@ pub struct Request {
     pub darts: DartWish,
     /// Turning of each rim but the first in units of 120°; `None`: what needs least stretch.
     pub turnings: Option<Vec<i32>>,
-    /// Lattice direction, degrees; `None`: what fits the seams.
+    /// Rims (0-based, ascending) that become straight hems.
+    pub straight: Vec<usize>,
+    /// Lattice direction, degrees; `None`: along the first straight hem, else what fits the seams.
     pub orientation_deg: Option<f64>,
     /// Slit pattern.
     pub handedness: Handedness,
@@ -121,6 +123,7 @@ impl Request {
             cones: ConeWish::Auto,
             darts: DartWish::Auto,
             turnings: None,
+            straight: Vec::new(),
             orientation_deg: None,
             handedness: Handedness::Right,
             remove_at_cone: None,

@@ -88,8 +88,10 @@ pub(crate) fn shape(
 ) -> Result<Shape, MakeError> {
     let original = &loaded.import.surface;
     let mut darts = loaded.darts.clone().unwrap_or_default();
-    let mut free =
-        loaded.darts.is_none() && request.cones == ConeWish::Auto && request.turnings.is_none();
+    let mut free = loaded.darts.is_none()
+        && request.cones == ConeWish::Auto
+        && request.turnings.is_none()
+        && request.straight.is_empty();
     let mut tries = Tries::default();
     let opened = darts.len();
     loop {
@@ -347,7 +349,12 @@ fn lay_out(
         .map_err(MakeError::Linkage)
     };
     let lay = |mut flat: Flattened, exact: bool| -> Result<Laid, MakeError> {
-        let mut fit = fitted(&flat, exact, request.orientation_deg)?;
+        let hem = request
+            .straight
+            .first()
+            .and_then(|&rim| surface.rims().get(rim))
+            .map(|rim| flat.layout.rim_direction(surface, rim).to_degrees());
+        let mut fit = fitted(&flat, exact, request.orientation_deg.or(hem))?;
         if !exact || request.orientation_deg.is_none() {
             // Whatever chose edge and orientation, the result is the one that these two alone would give, to the last
             // bit.
@@ -402,6 +409,13 @@ fn describe_map(flat: &Flattened, surface: &Surface, sigma: f64) -> String {
         0 => String::new(),
         _ => format!("; inner rims turning by {}", turnings.join(", ")),
     };
+    let hems: Vec<String> = flat
+        .singularities
+        .straight_rims()
+        .iter()
+        .map(|rim| format!("; rim {rim} straight"))
+        .collect();
+    let rims = rims + &hems.concat();
     format!(
         "conformal map: {cones}{rims}; λ from {} to {} (σ = {}), triangle edge {} mm",
         short(flat.scale.min, 3),

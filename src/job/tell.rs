@@ -249,6 +249,7 @@ pub(crate) fn figures(
                 "units": c.units,
             })).collect::<Vec<_>>(),
             "rim_turnings_deg": flat.singularities.rim_turnings_deg(),
+            "straight_rims": flat.singularities.straight_rims(),
             "distortion_of_fit": shape.distortion,
             "broken_faces": flat.metric.broken.len(),
             "lambda_min": flat.scale.min,
