@@ -11,9 +11,11 @@
 //! | `saddle` | disk | negative curvature |
 //! | `catenoid`, `vase`, `funnel` | annulus | seams, and how the turning of a rim matters |
 //! | `torus` | closed, one handle | closed form |
+//! | `double_torus` | closed, two handles | the pattern must close along four loops at once |
 //! | `octasphere` | closed | six cones in the right places make it developable by triangles |
 //! | `mask` | disk | a face |
 
+mod double_torus;
 mod mask;
 mod parameter;
 mod revolve;
@@ -21,6 +23,7 @@ mod shapes;
 
 use std::fmt;
 
+pub use double_torus::DoubleTorus;
 pub use mask::Mask;
 pub use parameter::Parameter;
 pub use shapes::{Bump, Cap, Catenoid, Funnel, Hemisphere, Octasphere, Saddle, Torus, Vase};
@@ -163,6 +166,8 @@ samples! {
     "funnel" => Funnel,
     /// a ring: closed, with a handle
     "torus" => Torus,
+    /// two rings grown together: closed, with two handles
+    "double_torus" => DoubleTorus,
     /// a closed sphere, meshed as a divided octahedron
     "octasphere" => Octasphere,
     /// a face in relief, in the manner of a theatre mask

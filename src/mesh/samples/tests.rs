@@ -37,6 +37,7 @@ fn every_default_is_a_good_mesh_of_the_size_and_topology_promised() {
         let (rims, genus) = match name {
             "catenoid" | "vase" | "funnel" => (2, 0),
             "torus" => (0, 1),
+            "double_torus" => (0, 2),
             "octasphere" => (0, 0),
             _ => (1, 0),
         };
@@ -223,4 +224,66 @@ fn a_rim_runs_with_the_surface_on_its_left() {
         cap.halfedges()
             .all(|h| HalfedgeId::side(h.face(), h.corner()) == h)
     );
+}
+
+/// The double torus: symmetric in three planes, even, as smooth as its tube is round, the outside out, at any size.
+#[test]
+fn the_double_torus_is_symmetric_even_and_smooth() {
+    for (t, faces) in [
+        (2.0, 400.0),
+        (3.0, 3000.0),
+        (2.0, 12000.0),
+        (3.0, 12000.0),
+        (3.5, 12000.0),
+    ] {
+        let shape = DoubleTorus {
+            t,
+            faces,
+            ..DoubleTorus::default()
+        };
+        let surface = Sample::DoubleTorus(shape).generate().unwrap();
+        assert_eq!((surface.genus(), surface.rims().len()), (2, 0), "t = {t}");
+        let (low, high) = surface.bounds();
+        assert!((high.x - 100.0).abs() < 1e-9 && (low.x + 100.0).abs() < 1e-9);
+        let made = surface.faces().len() as f64;
+        assert!((0.75..1.35).contains(&(made / faces)), "{made} for {faces}");
+        // Two rings of known volume overlap in the middle.
+        let tube = 100.0 / (2.0 * t + 1.0);
+        let rings = 4.0 * std::f64::consts::PI.powi(2) * t * tube.powi(3);
+        assert!((0.7..1.15).contains(&(volume(&surface) / rings)), "t = {t}");
+        let mut places: Vec<[i64; 3]> = Vec::new();
+        for p in surface.positions().iter() {
+            places.push([p.x, p.y, p.z].map(|x| (x * 1e6).round() as i64));
+        }
+        places.sort_unstable();
+        for k in 0..3 {
+            let mut images = places.clone();
+            images.iter_mut().for_each(|p| p[k] = -p[k]);
+            images.sort_unstable();
+            assert_eq!(places, images, "mirror {k}");
+        }
+        if faces > 2000.0 {
+            let spacing = (surface.area() / made / 0.433).sqrt();
+            let most = surface
+                .edges()
+                .map(|h| surface.length(h))
+                .fold(0.0, f64::max);
+            assert!(most < 3.0 * spacing, "t = {t}: {most} against {spacing}");
+            let angle = least_angle_deg(&surface);
+            assert!(angle > 14.0, "t = {t}: least angle {angle}");
+            for h in surface.edges() {
+                let twin = surface.twin(h).unwrap();
+                let bend = surface
+                    .face_normal_doubled(h.face())
+                    .angle(&surface.face_normal_doubled(twin.face()));
+                // In the fork the surface is curved twice as much as on the tube.
+                let room = 3.0 * surface.length(h).max(spacing) / tube;
+                assert!(
+                    bend < room.min(0.9),
+                    "t = {t}: {bend} at {}",
+                    surface.position(surface.tail(h))
+                );
+            }
+        }
+    }
 }
