@@ -67,6 +67,9 @@ pub struct MakeArgs {
     /// Triangles to drop at the cone: 4, 16, … [default: 4 at a positive cone, 16 where that fits better]
     #[arg(long, value_name = "N")]
     remove: Option<usize>,
+    /// auto leaves out the few triangles, if any, by which a sheet fails; none keeps all
+    #[arg(long, value_enum, default_value_t = LeaveOutArg::Auto)]
+    leave_out: LeaveOutArg,
     /// How far a rim turns in degrees, a multiple of 120 (-360: a hole in a plane, 0: a tube's end); once for each rim
     /// but the first, as `inspect` lists them [default: what needs least stretch]
     #[arg(long = "turning", value_name = "DEG", allow_hyphen_values = true)]
@@ -221,6 +224,12 @@ impl std::str::FromStr for Orientation {
 }
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum LeaveOutArg {
+    Auto,
+    None,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
 enum PatternArg {
     /// Triangles that point up are counter-clockwise slit cycles
     Right,
@@ -303,6 +312,7 @@ fn decided_by_design(args: &MakeArgs) -> Vec<&'static str> {
         (!args.cones.is_empty(), "--cone"),
         (!args.darts.is_empty(), "--dart"),
         (args.remove.is_some(), "--remove"),
+        (matches!(args.leave_out, LeaveOutArg::None), "--leave-out"),
         (!args.turnings.is_empty(), "--turning"),
         (!args.hems.is_empty(), "--hem"),
         (args.orientation.0.is_some(), "--orientation"),
@@ -387,6 +397,10 @@ fn from_arguments(args: &MakeArgs) -> Result<Request, Failure> {
         },
         cones: cone_wish(&args.cones)?,
         darts: dart_wish(&args.darts)?,
+        left_out: match args.leave_out {
+            LeaveOutArg::Auto => None,
+            LeaveOutArg::None => Some(Vec::new()),
+        },
         turnings: turning_wish(&args.turnings)?,
         straight: hem_wish(&args.hems)?,
         orientation_deg: args.orientation.0,

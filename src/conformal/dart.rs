@@ -242,7 +242,10 @@ mod tests {
         let edges = dart.edges(&cap).unwrap();
         let rims = edges.iter().filter(|h| cap.on_rim(cap.head(**h))).count();
         assert!(cap.on_rim(dart.stops[1]) && rims == 1);
-        assert_eq!(to_goals(&cap, &[dart.clone()], top, &[]).unwrap(), None);
+        assert_eq!(
+            to_goals(&cap, std::slice::from_ref(&dart), top, &[]).unwrap(),
+            None
+        );
         let open = slit_along(&cap, &[dart]).unwrap();
         assert_eq!((open.rims().len(), open.euler_characteristic()), (1, 1));
     }

@@ -92,6 +92,9 @@ pub struct LinkageChoice {
     pub pattern: Handedness,
     /// Triangles dropped at each positive cone.
     pub remove_at_cone: usize,
+    /// Triangles left out where the sheet cannot follow, by their numbers on the lattice.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<u32>,
     /// How far each rim but the first turns, multiples of 120°.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rim_turnings_deg: Vec<i32>,
@@ -327,6 +330,7 @@ impl Design {
             orientation_deg: Some(self.linkage.orientation_deg),
             handedness: self.linkage.pattern,
             remove_at_cone: Some(self.linkage.remove_at_cone),
+            left_out: Some(self.linkage.left_out.clone()),
             flaps: self.linkage.flaps,
             solver: self.solve.solver,
             accept_distance: self.solve.accept_distance,

@@ -219,6 +219,7 @@ fn decided(
             orientation_deg: shape.orientation_deg,
             pattern: request.handedness,
             remove_at_cone: shape.removed,
+            left_out: shape.left_out.clone(),
             rim_turnings_deg: shape.flat.singularities.rim_turnings_deg(),
             flaps: request.flaps,
             straight_rims: shape.flat.singularities.straight_rims(),

@@ -98,6 +98,8 @@ pub struct Request {
     pub remove_at_cone: Option<usize>,
     /// Doubled rows along the seams.
     pub flaps: FlapWish,
+    /// Triangles to leave out beside those at cones, by number; `None`: those few, if any, by which it fails.
+    pub left_out: Option<Vec<u32>>,
     /// Solver.
     pub solver: Solver,
     /// Distance from the surface that passes, in L.
@@ -127,6 +129,7 @@ impl Request {
             orientation_deg: None,
             handedness: Handedness::Right,
             remove_at_cone: None,
+            left_out: None,
             flaps: FlapWish::Auto,
             solver: Solver::Exact,
             accept_distance: ACCEPT_DISTANCE,

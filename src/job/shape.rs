@@ -18,11 +18,11 @@ use crate::base::units::short;
 use crate::conformal::{
     ConformalError, Dart, FlattenOptions, Flattened, Sizing, around_handles, patches, to_goals,
 };
-use crate::linkage::{Built, Flaps, Linkage, LinkageOptions, build, fit};
+use crate::linkage::{Built, Flaps, Linkage, LinkageOptions, build_without, fit};
 use crate::machine::Machine;
 use crate::mesh::{ClosestPoint, Surface};
 use crate::pattern::{self, PatternError, Sheet};
-use crate::rationalize::{Effort, Quality, rationalize};
+use crate::rationalize::{Effort, Quality, failing, rationalize};
 
 /// What the sheet is to be, whatever its shape.
 pub(crate) struct Stock<'a> {
@@ -46,6 +46,8 @@ pub(crate) struct Shape {
     pub built: Built,
     /// Triangles removed at each positive cone.
     pub removed: usize,
+    /// Triangles left out beside those at cones, by their numbers; see [`Built::numbers`].
+    pub left_out: Vec<u32>,
     /// Direction of the lattice against the layout's X, degrees.
     pub orientation_deg: f64,
     /// Angle distortion that fitting the lattice to the seams added, root mean square; 0 for none.
@@ -77,6 +79,11 @@ const MOST_DARTS: usize = 8;
 /// While there are darts to try, a map is laid out only if its misfit is smaller, in L: the sheet then misses the
 /// surface by about a third of that.
 const PROMISING: f64 = 0.7;
+
+/// Where a linkage fails by a few triangles only, it is made again without them, so often at the most.
+const MENDED: usize = 4;
+/// Part of all triangles that may be left out like this.
+const MOST_LEFT_OUT: f64 = 0.015;
 
 /// Finds the shape: the first map that passes, with as few darts as possible, else the one that comes closest.
 pub(crate) fn shape(
@@ -137,7 +144,10 @@ pub(crate) fn shape(
     // Nothing passed. The most promising of what was left for later, for the best answer to give.
     let mut waiting = std::mem::take(&mut tries.waiting);
     waiting.sort_by(|a, b| a.misfit().total_cmp(&b.misfit()));
-    for map in waiting.into_iter().take(TRIED.saturating_sub(tries.count)) {
+    for map in waiting {
+        if tries.count >= TRIED {
+            break;
+        }
         if let Some(shape) = tries.attempt(request, map, stock, closest, progress)? {
             return Ok(shape);
         }
@@ -198,7 +208,6 @@ impl Tries {
         closest: &ClosestPoint,
         progress: &dyn Progress,
     ) -> Result<Option<Shape>, MakeError> {
-        self.count += 1;
         self.here.1 += 1;
         let shape = match attempt(request, map, stock, closest, progress) {
             Ok(shape) => shape,
@@ -211,6 +220,13 @@ impl Tries {
             }
             Err(error) => return Err(error),
         };
+        self.count += 1;
+        if !shape.verdict.pass {
+            progress.note(&format!(
+                "tried: the sheet misses the surface by {} L",
+                short(shape.quality.distance_max.value, 2)
+            ));
+        }
         if shape.verdict.pass {
             return Ok(Some(shape));
         }
@@ -223,9 +239,59 @@ impl Tries {
     }
 }
 
+/// Lays a linkage on a map, solves and judges it; where it fails by a few triangles only, it is made once more without
+/// them.
 fn attempt(
     request: &Request,
     map: Map,
+    stock: &Stock<'_>,
+    closest: &ClosestPoint,
+    progress: &dyn Progress,
+) -> Result<Shape, MakeError> {
+    let mut left_out = request.left_out.clone().unwrap_or_default();
+    let laid = lay_out(request, &map, &left_out, stock.sigma, progress)?;
+    progress.note(&describe_map(&laid.flat, &map.ground.surface, stock.sigma));
+    let (flat, lattice) = (laid.flat.clone(), laid.lattice);
+    let (orientation_deg, distortion) = (laid.orientation_deg, laid.distortion);
+    let whole = laid.built.linkage.triangles.len();
+    let first = solve(request, &map, laid, &left_out, stock, closest, progress)?;
+    if first.verdict.pass || request.left_out.is_some() {
+        return Ok(first);
+    }
+    let most = (MOST_LEFT_OUT * whole as f64) as usize;
+    let mut failing = first.failing(request, stock, closest);
+    for _ in 0..MENDED {
+        left_out.extend(&failing);
+        left_out.sort_unstable();
+        if failing.is_empty() || left_out.len() > most {
+            break;
+        }
+        progress.note(&format!("left out: {} triangles", left_out.len()));
+        let surface = &map.ground.surface;
+        let built = build_without(surface, &flat.layout, &lattice, &left_out, progress)
+            .map_err(MakeError::Linkage)?;
+        let laid = Laid {
+            flat: flat.clone(),
+            built,
+            lattice,
+            orientation_deg,
+            distortion,
+        };
+        let mended = solve(request, &map, laid, &left_out, stock, closest, progress)?;
+        if mended.verdict.pass {
+            return Ok(mended);
+        }
+        failing = mended.failing(request, stock, closest);
+    }
+    Ok(first)
+}
+
+/// Solves and judges a linkage, and draws its sheet.
+fn solve(
+    request: &Request,
+    map: &Map,
+    laid: Laid,
+    left_out: &[u32],
     stock: &Stock<'_>,
     closest: &ClosestPoint,
     progress: &dyn Progress,
@@ -237,8 +303,8 @@ fn attempt(
         built,
         orientation_deg,
         distortion,
-    } = lay_out(request, surface, &map, stock.sigma, progress)?;
-    progress.note(&describe_map(&flat, surface, stock.sigma));
+        ..
+    } = laid;
     // The sheet depends on flat positions only: what does not fit the bed is known before the long solve.
     let (mut sheet, mut motion) = (None, None);
     let mut flaps = match request.flaps {
@@ -299,6 +365,7 @@ fn attempt(
         flat,
         built,
         removed: map.removal,
+        left_out: left_out.to_vec(),
         orientation_deg,
         distortion,
         flaps,
@@ -318,18 +385,31 @@ struct Laid {
     /// The map, warped so that the lattice goes on across its seams.
     flat: Flattened,
     built: Built,
+    lattice: LinkageOptions,
     orientation_deg: f64,
     distortion: f64,
+}
+
+impl Shape {
+    /// The numbers of the triangles by which it fails.
+    fn failing(&self, request: &Request, stock: &Stock<'_>, closest: &ClosestPoint) -> Vec<u32> {
+        let accept = request.accept_distance;
+        failing(&self.linkage, &self.positions, closest, stock.sigma, accept)
+            .into_iter()
+            .map(|t| self.built.numbers[t.0 as usize])
+            .collect()
+    }
 }
 
 /// Lays the lattice. With a number of triangles asked for, the edge is corrected once for those that the rim costs.
 fn lay_out(
     request: &Request,
-    surface: &Surface,
     map: &Map,
+    left_out: &[u32],
     sigma: f64,
     progress: &dyn Progress,
 ) -> Result<Laid, MakeError> {
+    let surface = &map.ground.surface;
     let resized = |sizing: Sizing| {
         let options = FlattenOptions {
             sizing,
@@ -368,11 +448,13 @@ fn lay_out(
             remove_at_cone: map.removal,
             sigma,
         };
-        let built = build(surface, &fit.layout, &lattice, progress).map_err(MakeError::Linkage)?;
+        let built = build_without(surface, &fit.layout, &lattice, left_out, progress)
+            .map_err(MakeError::Linkage)?;
         flat.layout = fit.layout;
         Ok(Laid {
             flat,
             built,
+            lattice,
             orientation_deg: fit.orientation_deg,
             distortion: fit.distortion,
         })

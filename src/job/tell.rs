@@ -56,6 +56,15 @@ pub(crate) fn warnings(
             flat.metric.broken.len()
         ));
     }
+    if !shape.left_out.is_empty() {
+        warnings.push(format!(
+            "{} were left out where the sheet cannot follow: openings of their size stay in it",
+            match shape.left_out.len() {
+                1 => "1 triangle".to_owned(),
+                n => format!("{n} triangles"),
+            }
+        ));
+    }
     if built.lost > 0 {
         warnings.push(format!(
             "at the rim {} hanging by fewer than two others left out",
@@ -263,6 +272,7 @@ pub(crate) fn figures(
             "triangles": built.linkage.triangles.len(),
             "hinges": built.linkage.hinges.len(),
             "removed_at_cone": built.removed,
+            "left_out_where_it_fails": shape.left_out.len(),
             "left_out_at_rim": built.lost,
             "seam_edges": built.seam_edges,
             "seam_edges_without_flaps": shape.flaps.bare_edges(),

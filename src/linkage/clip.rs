@@ -26,6 +26,8 @@ pub(crate) struct Laid {
     pub colour: Colour,
     /// Per side: the triangle across it and that triangle's side.
     pub neighbours: [Option<(usize, usize)>; 3],
+    /// Its number among all that were laid.
+    pub number: u32,
 }
 
 /// Closer than this (in L) counts as the same place, or than a few times the seam's gap if that is more: a symmetric
@@ -72,6 +74,7 @@ pub(crate) fn lay(
                 corners,
                 colour: key.colour,
                 neighbours: [None; 3],
+                number: laid.len() as u32,
             });
         }
     }
@@ -356,6 +359,7 @@ mod tests {
                 barycentric: [1.0, 0.0, 0.0],
                 corners: [Point2::origin(); 3],
                 colour: Colour::Up,
+                number: n as u32,
                 neighbours: [
                     if n + 1 < count {
                         link(n + 1)

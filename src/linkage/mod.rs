@@ -62,6 +62,8 @@ pub struct Built {
     pub lost: usize,
     /// Triangles removed at cones, as asked.
     pub removed: usize,
+    /// The number of each triangle among all that were laid: what [`build_without`] leaves out goes by these.
+    pub numbers: Vec<u32>,
     /// Pairs of triangles that lie on one another on the sheet: none, or a mistake of this program.
     pub overlaps: Vec<(TriangleId, TriangleId)>,
     /// Pieces of the sheet: more than one where it would lie on itself otherwise.
@@ -130,6 +132,21 @@ pub fn build(
     options: &LinkageOptions,
     progress: &dyn Progress,
 ) -> Result<Built, LinkageError> {
+    build_without(surface, layout, options, &[], progress)
+}
+
+/// Builds the linkage of a layout without some triangles, by their [`Built::numbers`]: openings where the sheet cannot
+/// follow. Numbers that are none are passed over.
+///
+/// # Errors
+/// [`LinkageError`]: nothing fits, far too much fits, interruption.
+pub fn build_without(
+    surface: &Surface,
+    layout: &Layout,
+    options: &LinkageOptions,
+    left_out: &[u32],
+    progress: &dyn Progress,
+) -> Result<Built, LinkageError> {
     let edge_mm = options.edge_mm;
     let (area, (width_mm, height_mm)) = (layout.area_mm2(), extent(layout));
     let triangle_area = 0.5 * lattice::HEIGHT * edge_mm * edge_mm;
@@ -148,8 +165,13 @@ pub fn build(
     }
     let lattice = Lattice::new(edge_mm, options.orientation);
     let laid = clip::lay(surface, layout, &lattice, edge_mm, progress)?;
-    let dropped = clip::around_cones(&laid, options.remove_at_cone);
+    let mut dropped = clip::around_cones(&laid, options.remove_at_cone);
     let removed = dropped.iter().filter(|d| **d).count();
+    for &number in left_out {
+        if let Some(dropped) = dropped.get_mut(number as usize) {
+            *dropped = true;
+        }
+    }
     let (kept, lost) = clip::core(&laid, |n| !dropped[n]);
     if kept.is_empty() {
         return Err(nothing());
@@ -173,6 +195,7 @@ pub fn build(
         start,
         lost,
         removed,
+        numbers: kept.iter().map(|l| l.number).collect(),
         overlaps: flat.overlaps.iter().map(|&(a, b)| (id(a), id(b))).collect(),
         pieces: flat.pieces,
         seam_edges: flat.seam_edges,

@@ -527,6 +527,7 @@ pub(super) mod tests {
             barycentric,
             corners,
             colour: Colour::Up,
+            number: 0,
             neighbours,
         }
     }

@@ -14,7 +14,7 @@ use nalgebra::{Point3, Vector3};
 
 pub use exact::Effort;
 pub use problem::Problem;
-pub use quality::{OVERLAP_TOLERANCE, Quality, SIGMA_TOLERANCE, Worst};
+pub use quality::{OVERLAP_TOLERANCE, Quality, SIGMA_TOLERANCE, Worst, failing};
 
 use crate::base::progress::{Interrupted, Progress};
 use crate::base::sparse::FactorError;

@@ -118,9 +118,7 @@ impl Quality {
         let mut over_sigma = 0;
         for h in &problem.hinges {
             let p = h.map(|i| x[i as usize]);
-            let value = |c: Condition| c.evaluate(&p).map_or(f64::NEG_INFINITY, |s| s.value);
-            let depth = -value(Condition::SecondClear).min(value(Condition::FirstClear));
-            let past = -value(Condition::FirstOpen).min(value(Condition::SecondOpen));
+            let (depth, past) = penetration(&p);
             let over_open = past > OPEN_SLACK && depth <= past;
             if depth > OVERLAP_TOLERANCE && !over_open {
                 penetrations += 1;
@@ -138,17 +136,15 @@ impl Quality {
             over_sigma += usize::from(scale > sigma + SIGMA_TOLERANCE || over_open);
         }
 
-        let centroids: Vec<Vector3<f64>> = problem
+        let centroids = centroids(&problem, &x);
+        let facing_away = problem
             .triangles
             .iter()
-            .map(|t| t.iter().map(|&i| x[i as usize]).sum::<Vector3<f64>>() / 3.0)
-            .collect();
-        let mut facing_away = 0;
-        for (t, centroid) in problem.triangles.iter().zip(&centroids) {
-            let [a, b, c] = t.map(|i| x[i as usize]);
-            let face = closest.query(Point3::from(centroid * edge_mm)).face;
-            facing_away += usize::from((b - a).cross(&(c - a)).dot(&closest.normal(face)) < 0.0);
-        }
+            .zip(&centroids)
+            .filter(|(t, centroid)| {
+                faces_away(&t.map(|i| x[i as usize]), centroid, closest, edge_mm)
+            })
+            .count();
         let (intersections, crossing) = intersections(&problem, &x, &centroids);
 
         Self {
@@ -173,16 +169,99 @@ impl Quality {
     }
 }
 
+/// The triangles by which a linkage fails: those with a point farther than `accept_distance` (in L) from the surface,
+/// those that face away from it, and those that run into another, in ascending order.
+pub fn failing(
+    linkage: &Linkage,
+    positions: &[Point3<f64>],
+    closest: &ClosestPoint,
+    sigma: f64,
+    accept_distance: f64,
+) -> Vec<TriangleId> {
+    let edge_mm = linkage.edge_mm;
+    let problem = Problem::new(linkage, sigma);
+    let x: Vec<Vector3<f64>> = positions.iter().map(|p| p.coords / edge_mm).collect();
+    let far: Vec<bool> = positions
+        .iter()
+        .map(|p| closest.query(*p).distance > accept_distance * edge_mm)
+        .collect();
+    let centroids = centroids(&problem, &x);
+    let mut fails: Vec<bool> = problem
+        .triangles
+        .iter()
+        .zip(&centroids)
+        .map(|(t, centroid)| {
+            t.iter().any(|&i| far[i as usize])
+                || faces_away(&t.map(|i| x[i as usize]), centroid, closest, edge_mm)
+        })
+        .collect();
+    for (hinge, h) in linkage.hinges.iter().zip(&problem.hinges) {
+        if penetration(&h.map(|i| x[i as usize])).0 > OVERLAP_TOLERANCE {
+            fails[hinge.ccw.triangle.index()] = true;
+            fails[hinge.cw.triangle.index()] = true;
+        }
+    }
+    intersecting(&problem, &x, &centroids, |a, b| {
+        (fails[a], fails[b]) = (true, true)
+    });
+    (0..fails.len())
+        .filter(|&t| fails[t])
+        .map(TriangleId::from_index)
+        .collect()
+}
+
+/// How deep the triangles of a hinge penetrate each other, and how far it is opened past 180°, in L; negative where
+/// they do not.
+fn penetration(p: &[Vector3<f64>; 5]) -> (f64, f64) {
+    let value = |c: Condition| c.evaluate(p).map_or(f64::NEG_INFINITY, |s| s.value);
+    let depth = -value(Condition::SecondClear).min(value(Condition::FirstClear));
+    let past = -value(Condition::FirstOpen).min(value(Condition::SecondOpen));
+    (depth, past)
+}
+
+fn centroids(problem: &Problem, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    problem
+        .triangles
+        .iter()
+        .map(|t| t.iter().map(|&i| x[i as usize]).sum::<Vector3<f64>>() / 3.0)
+        .collect()
+}
+
+/// Whether a triangle (in L) faces away from the surface where that is nearest.
+fn faces_away(
+    [a, b, c]: &[Vector3<f64>; 3],
+    centroid: &Vector3<f64>,
+    closest: &ClosestPoint,
+    edge_mm: f64,
+) -> bool {
+    let face = closest.query(Point3::from(centroid * edge_mm)).face;
+    (b - a).cross(&(c - a)).dot(&closest.normal(face)) < 0.0
+}
+
 /// Pairs of triangles without a common point that cross, and one of them.
 fn intersections(
     problem: &Problem,
     x: &[Vector3<f64>],
     centroids: &[Vector3<f64>],
 ) -> (usize, Option<TriangleId>) {
+    let (mut count, mut first) = (0, None);
+    intersecting(problem, x, centroids, |a, _| {
+        count += 1;
+        first.get_or_insert(TriangleId::from_index(a));
+    });
+    (count, first)
+}
+
+/// Tells of every pair of triangles without a common point that cross.
+fn intersecting(
+    problem: &Problem,
+    x: &[Vector3<f64>],
+    centroids: &[Vector3<f64>],
+    mut tell: impl FnMut(usize, usize),
+) {
     // Circumradius 1/√3: centroids of triangles that meet are no farther apart than twice that.
     let reach = 2.0 / 3f64.sqrt();
     let grid = PointGrid::new(centroids, reach);
-    let (mut count, mut first) = (0, None);
     for (n, centre) in centroids.iter().enumerate() {
         grid.near(centre, reach, |other| {
             if other <= n
@@ -194,12 +273,10 @@ fn intersections(
             }
             let [a, b] = [n, other].map(|t| problem.triangles[t].map(|i| x[i as usize]));
             if edges_cross(&a, &b) || edges_cross(&b, &a) {
-                count += 1;
-                first.get_or_insert(TriangleId::from_index(n));
+                tell(n, other);
             }
         });
     }
-    (count, first)
 }
 
 /// True if an edge of `a` passes through the inside of `b` by more than the tolerance.
