@@ -47,8 +47,11 @@ pub(super) fn from_cones(surface: &Surface, metric: &Metric, cones: &[Cone]) -> 
                 ),
             ] {
                 let known = (distance[here], distance[near]);
-                let found =
-                    through(known, to_near, (to_far, across)).unwrap_or(distance[here] + to_far);
+                let straight = through(known, to_near, (to_far, across));
+                // Never nearer than where it came from: rounding in a needle could go on improving for ever.
+                let found = straight
+                    .unwrap_or(distance[here] + to_far)
+                    .max(distance[here]);
                 if found < distance[far] {
                     distance[far] = found;
                     queue.push(Reverse((found.to_bits(), far)));

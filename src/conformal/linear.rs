@@ -1,7 +1,7 @@
 //! The linear model of the conformal map: its first Newton step, for all singularities at once.
 
 use super::metric::spread;
-use super::system::{System, Unknowns};
+use super::system::{Energy as _, System, Unknowns};
 use super::{CURVATURE_UNIT, ConformalError};
 use crate::base::ids::{Id as _, Per};
 use crate::mesh::{Surface, VertexId};
@@ -29,7 +29,7 @@ impl<'s> LinearModel<'s> {
         target: &[f64],
     ) -> Result<Self, ConformalError> {
         let mut rhs = vec![0.0; unknowns.count + 1];
-        system.evaluate(&vec![0.0; unknowns.count + 1], target, &mut rhs);
+        system.evaluate(&vec![0.0; unknowns.count + 1], target, &mut rhs)?;
         system.factor_start()?;
         rhs.iter_mut().for_each(|g| *g = -*g);
         system.solve_columns(&mut rhs[..unknowns.count], 1);
@@ -50,7 +50,7 @@ impl<'s> LinearModel<'s> {
         u: &[f64],
     ) -> Result<Self, ConformalError> {
         let mut rhs = vec![0.0; unknowns.count + 1];
-        system.evaluate(u, &vec![0.0; unknowns.count + 1], &mut rhs);
+        system.evaluate(u, &vec![0.0; unknowns.count + 1], &mut rhs)?;
         system.factor_here()?;
         Ok(Self {
             surface,

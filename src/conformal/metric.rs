@@ -12,8 +12,9 @@
 
 use std::f64::consts::PI;
 
+use super::intrinsic::{FlatFace, Intrinsic};
 pub(super) use super::linear::LinearModel;
-use super::system::{System, Unknowns, dot, norm};
+use super::system::{Energy, System, Unknowns, dot, norm};
 use super::{CURVATURE_UNIT, ConformalError, Singularities};
 use crate::base::ids::{Id as _, Per};
 use crate::base::progress::Progress;
@@ -28,8 +29,11 @@ const ANGLE_TOLERANCE: f64 = 1e-12;
 /// layout's seams close to this accuracy.
 const ANGLE_ACCEPTED: f64 = 1e-8;
 
-/// Newton steps before giving up. Good meshes take 2–7, meshes with broken triangles up to some dozens.
-const MAX_STEPS: usize = 200;
+/// Newton steps on the mesh's own triangles before edges are flipped. Good meshes take 2–7.
+const MAX_STEPS: usize = 30;
+
+/// Newton steps with flips before giving up.
+const MAX_FLIPPING_STEPS: usize = 100;
 
 /// The last step is solved this much better than the tolerance asks, so that it is the last.
 const SPARE: f64 = 0.03;
@@ -46,13 +50,32 @@ pub struct Metric {
     pub steps: usize,
     /// Largest remaining error of an angle sum, radians.
     pub residual: f64,
-    /// Faces whose scaled lengths break the triangle inequality: drawn with angles 0 and π.
+    /// Faces without area or turned over in the flat metric. Where edges were not flipped, their scaled lengths break
+    /// the triangle inequality, and they are drawn with angles 0 and π.
     pub broken: Vec<FaceId>,
+    /// Edges flipped on the way; 0 where the mesh's own triangles carry the map, so that its lengths are the scaled ones.
+    pub flips: usize,
+    /// The faces' own lengths, where edges were flipped.
+    flat: Option<Per<FaceId, FlatFace>>,
 }
 
 impl Metric {
-    /// Scaled lengths of a face's sides (side k from corner k to k + 1).
+    /// How far the two sides after side `k` of a face each turn from the side before, counter-clockwise, radians.
+    pub(super) fn turns(&self, surface: &Surface, face: FaceId, k: usize) -> [f64; 2] {
+        if let Some(flat) = &self.flat {
+            let side = |k: usize| flat[face].sides[k % 3];
+            return [0, 1].map(|i| (side(k + i + 1) * side(k + i).conj()).arg());
+        }
+        // Opposite side k lies corner k + 2.
+        let (angle, ..) = angles(self.lengths(surface, face));
+        [PI - angle[(k + 2) % 3], PI - angle[k]]
+    }
+
+    /// Flat lengths of a face's sides (side k from corner k to k + 1).
     pub fn lengths(&self, surface: &Surface, face: FaceId) -> [f64; 3] {
+        if let Some(flat) = &self.flat {
+            return flat[face].sides.map(|side| side.norm());
+        }
         let v = surface.faces()[face];
         let p = surface.corners(face);
         std::array::from_fn(|k| {
@@ -203,39 +226,62 @@ impl<'a> MetricSolver<'a> {
         singularities.check(self.surface)?;
         self.straighten(&singularities.straight)?;
         let target = self.targets(singularities);
-        let solved = newton(&mut self.system, &target, progress)?;
-        if solved.residual > ANGLE_ACCEPTED {
-            let rows = self.system.count() as u32;
-            let worst = (0..rows)
-                .max_by(|&a, &b| {
-                    let off = |row: u32| solved.gradient[row as usize].abs();
-                    off(a).total_cmp(&off(b))
-                })
-                .unwrap_or(0);
-            let at = self.unknowns.of.iter().position(|&row| row == worst);
-            let vertex = VertexId::from_index(at.unwrap_or(0));
-            return Err(ConformalError::NotConverged {
-                steps: solved.steps,
-                residual_deg: solved.residual.to_degrees(),
-                vertex,
-                position: self.surface.position(vertex).into(),
-            });
+        let plain = newton(&mut self.system, &target, MAX_STEPS, progress);
+        let good = |s: &Solved| s.residual <= ANGLE_ACCEPTED && s.broken == 0;
+        match plain {
+            Ok(solved) if good(&solved) => return Ok(self.metric(&solved, None)),
+            Err(error @ ConformalError::Interrupted(_)) => return Err(error),
+            _ => {}
         }
+        let lengths = side_lengths(self.surface)?;
+        let mut intrinsic = Intrinsic::new(self.surface, &lengths, &self.unknowns);
+        let doubled: Vec<f64> = target.iter().map(|t| t * intrinsic.copies()).collect();
+        let mut solved = newton(&mut intrinsic, &doubled, MAX_FLIPPING_STEPS, progress)?;
+        if solved.residual <= ANGLE_ACCEPTED {
+            return Ok(self.metric(&solved, Some(intrinsic)));
+        }
+        // Broken triangles that close are better than whole ones that do not.
+        match plain {
+            Ok(closed) if closed.residual <= ANGLE_ACCEPTED => {
+                return Ok(self.metric(&closed, None));
+            }
+            _ => {}
+        }
+        solved.residual /= intrinsic.copies();
+        let rows = self.system.count() as u32;
+        let off = |row: u32| solved.gradient[row as usize].abs();
+        let worst = (0..rows)
+            .max_by(|&a, &b| off(a).total_cmp(&off(b)))
+            .unwrap_or(0);
+        let at = self.unknowns.of.iter().position(|&row| row == worst);
+        let vertex = VertexId::from_index(at.unwrap_or(0));
+        Err(ConformalError::NotConverged {
+            steps: solved.steps,
+            residual_deg: solved.residual.to_degrees(),
+            vertex,
+            position: self.surface.position(vertex).into(),
+        })
+    }
+
+    /// The metric that Newton's method found, on the triangulation where it did.
+    fn metric(&self, solved: &Solved, intrinsic: Option<Intrinsic>) -> Metric {
         let mut metric = Metric {
             u: spread(&self.unknowns, &solved.u),
             steps: solved.steps,
             residual: solved.residual,
             broken: Vec::new(),
+            flips: intrinsic.as_ref().map_or(0, Intrinsic::flips),
+            flat: intrinsic.map(|found| found.flat_faces(&solved.u).into_iter().collect()),
         };
-        if solved.broken > 0 {
-            metric.broken = self
-                .surface
-                .faces()
-                .ids()
+        let faces = self.surface.faces().ids();
+        metric.broken = match &metric.flat {
+            Some(flat) => faces.filter(|f| flat[*f].is_broken()).collect(),
+            None if solved.broken == 0 => Vec::new(),
+            None => faces
                 .filter(|f| angles(metric.lengths(self.surface, *f)).2)
-                .collect();
-        }
-        Ok(metric)
+                .collect(),
+        };
+        metric
     }
 
     /// What the angles of every unknown sum to: around a vertex, or along a rim.
@@ -302,26 +348,24 @@ struct Solved {
 
 /// Newton's method with line search.
 fn newton(
-    system: &mut System,
+    system: &mut impl Energy,
     target: &[f64],
+    most_steps: usize,
     progress: &dyn Progress,
 ) -> Result<Solved, ConformalError> {
     let zeros = || vec![0.0; system.count() + 1];
     let (mut u, mut gradient, mut step) = (zeros(), zeros(), zeros());
     let (mut trial, mut trial_gradient) = (zeros(), zeros());
-    let mut broken = system.evaluate(&u, target, &mut gradient);
+    let mut broken = system.evaluate(&u, target, &mut gradient)?;
     let mut residual = norm(&gradient);
     let mut steps = 0;
     // The gradient that a step leaves is about the square of that before it: no use in solving better than that.
     let mut forcing: f64 = LOOSEST;
-    while residual > ANGLE_TOLERANCE && steps < MAX_STEPS {
+    while residual > ANGLE_TOLERANCE && steps < most_steps {
         progress.check()?;
-        if steps == 0 {
-            system.first_step(&gradient, &mut step)?;
-        } else {
-            let enough = SPARE * ANGLE_TOLERANCE / residual;
-            system.step(&gradient, forcing.max(enough), &mut step)?;
-        }
+        let enough = SPARE * ANGLE_TOLERANCE / residual;
+        let accuracy = (steps > 0).then_some(forcing.max(enough));
+        system.step(&gradient, accuracy, &mut step)?;
         let slope = dot(&gradient, &step);
         // The function is convex along the line, so its slope tells everything: a step is good while the slope has not
         // turned clearly positive, and no function value, with its cancellation, is ever needed.
@@ -330,7 +374,7 @@ fn newton(
             for ((t, u), s) in trial.iter_mut().zip(&u).zip(&step) {
                 *t = u + length * s;
             }
-            broken = system.evaluate(&trial, target, &mut trial_gradient);
+            broken = system.evaluate(&trial, target, &mut trial_gradient)?;
             let trial_slope = dot(&trial_gradient, &step);
             let rest = norm(&trial_gradient);
             if rest.is_finite() && (trial_slope <= -0.1 * slope || rest < 0.5 * residual) {

@@ -12,6 +12,7 @@ mod cut;
 mod dart;
 mod distance;
 mod field;
+mod intrinsic;
 mod layout;
 mod linear;
 mod metric;

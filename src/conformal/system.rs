@@ -14,6 +14,33 @@ use crate::base::sparse::{Cholesky, FactorError, Pattern};
 /// Rounds of conjugate gradients at the most in one step; one costs about an eighth of a factorisation.
 const MOST_ROUNDS: usize = 8;
 
+/// A convex function of the unknowns, for Newton's method.
+pub(super) trait Energy {
+    /// Number of unknowns; vectors have one entry more.
+    fn count(&self) -> usize;
+
+    /// Gradient Θ − Σα at `u` into `gradient`; the Hessian there is kept for [`Energy::step`]. Returns the number of
+    /// broken faces.
+    fn evaluate(
+        &mut self,
+        u: &[f64],
+        target: &[f64],
+        gradient: &mut [f64],
+    ) -> Result<usize, FactorError>;
+
+    /// A Newton step at the point last evaluated, into `step`, accurate to `forcing` times the gradient, downhill in any
+    /// case; without `forcing` the first one, at u = 0.
+    ///
+    /// # Errors
+    /// [`FactorError`] if no multiple of the diagonal makes the Hessian positive definite.
+    fn step(
+        &mut self,
+        gradient: &[f64],
+        forcing: Option<f64>,
+        step: &mut [f64],
+    ) -> Result<(), FactorError>;
+}
+
 /// Which unknown the logarithmic factor of each vertex is.
 #[derive(Clone, Debug)]
 pub(super) struct Unknowns {
@@ -125,58 +152,10 @@ impl System {
         })
     }
 
-    /// Number of unknowns; vectors have one entry more.
-    pub fn count(&self) -> usize {
-        self.count
-    }
-
-    /// Gradient Θ − Σα at `u` into `gradient`, and the Hessian there, kept for [`System::step`]. Returns the number of
-    /// broken faces.
-    pub fn evaluate(&mut self, u: &[f64], target: &[f64], gradient: &mut [f64]) -> usize {
-        for (half, u) in self.half.iter_mut().zip(u) {
-            *half = (0.5 * u).exp();
-        }
-        self.sums.fill([0.0; 2]);
-        self.hessian.fill(0.0);
-        let mut broken = 0;
-        for ((corners, lengths), sides) in self.corners.iter().zip(&self.lengths).zip(&self.sides) {
-            let at = corners.map(|c| c as usize);
-            let e = at.map(|c| self.half[c]);
-            let (angle, cot, bad) = corner_angles([
-                lengths[0] * e[0] * e[1],
-                lengths[1] * e[1] * e[2],
-                lengths[2] * e[2] * e[0],
-            ]);
-            broken += usize::from(bad);
-            // Along a rim both ends are one unknown, and their difference is nothing.
-            let half: [f64; 3] = std::array::from_fn(|k| {
-                if corners[k] == corners[(k + 1) % 3] {
-                    0.0
-                } else {
-                    0.5 * cot[k]
-                }
-            });
-            for k in 0..3 {
-                // `angle[k]` lies opposite side k, that is at corner k + 2; sides k and k − 1 meet at corner k.
-                let sums = &mut self.sums[at[k]];
-                sums[0] += angle[(k + 1) % 3];
-                sums[1] += half[k] + half[(k + 2) % 3];
-                self.hessian[sides[k] as usize] -= half[k];
-            }
-        }
-        let pattern = self.cholesky.pattern();
-        for i in 0..self.count {
-            gradient[i] = target[i] - self.sums[i][0];
-            self.hessian[pattern.diagonal(i)] = self.sums[i][1];
-        }
-        gradient[self.count] = 0.0;
-        broken
-    }
-
-    /// Factors the Hessian at u = 0, where [`System::evaluate`] was called last, unless that is the factor at hand.
+    /// Factors the Hessian at u = 0, where [`Energy::evaluate`] was called last, unless that is the factor at hand.
     ///
     /// # Errors
-    /// As [`System::step`].
+    /// As [`Energy::step`].
     pub fn factor_start(&mut self) -> Result<(), FactorError> {
         if self.factored != Factored::Start {
             self.factor()?;
@@ -185,10 +164,10 @@ impl System {
         Ok(())
     }
 
-    /// Factors the Hessian where [`System::evaluate`] was called last.
+    /// Factors the Hessian where [`Energy::evaluate`] was called last.
     ///
     /// # Errors
-    /// As [`System::step`].
+    /// As [`Energy::step`].
     pub fn factor_here(&mut self) -> Result<(), FactorError> {
         self.factor()?;
         self.factored = Factored::Other;
@@ -198,37 +177,6 @@ impl System {
     /// The factored system's solutions in place of `count` right-hand sides, each without the held entry.
     pub fn solve_columns(&mut self, rhs: &mut [f64], count: usize) {
         self.cholesky.solve_columns(rhs, count);
-    }
-
-    /// The Newton step at u = 0, where [`System::evaluate`] was called last, into `step`.
-    ///
-    /// # Errors
-    /// As [`System::step`].
-    pub fn first_step(&mut self, gradient: &[f64], step: &mut [f64]) -> Result<(), FactorError> {
-        self.factor_start()?;
-        self.solve_downhill(gradient, step);
-        Ok(())
-    }
-
-    /// A Newton step at the point last evaluated, into `step`, accurate to `forcing` times the gradient: downhill in
-    /// any case.
-    ///
-    /// # Errors
-    /// [`FactorError`] if no multiple of the diagonal makes the Hessian positive definite.
-    pub fn step(
-        &mut self,
-        gradient: &[f64],
-        forcing: f64,
-        step: &mut [f64],
-    ) -> Result<(), FactorError> {
-        if self.factored == Factored::Nothing || !self.conjugate_gradients(gradient, forcing, step)
-        {
-            self.factor()?;
-            self.factored = Factored::Other;
-            self.solve_downhill(gradient, step);
-        }
-        step[self.count] = 0.0;
-        Ok(())
     }
 
     fn solve_downhill(&mut self, gradient: &[f64], step: &mut [f64]) {
@@ -306,6 +254,82 @@ impl System {
                 other => return other,
             }
         }
+    }
+}
+
+impl Energy for System {
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    fn evaluate(
+        &mut self,
+        u: &[f64],
+        target: &[f64],
+        gradient: &mut [f64],
+    ) -> Result<usize, FactorError> {
+        for (half, u) in self.half.iter_mut().zip(u) {
+            *half = (0.5 * u).exp();
+        }
+        self.sums.fill([0.0; 2]);
+        self.hessian.fill(0.0);
+        let mut broken = 0;
+        for ((corners, lengths), sides) in self.corners.iter().zip(&self.lengths).zip(&self.sides) {
+            let at = corners.map(|c| c as usize);
+            let e = at.map(|c| self.half[c]);
+            let (angle, cot, bad) = corner_angles([
+                lengths[0] * e[0] * e[1],
+                lengths[1] * e[1] * e[2],
+                lengths[2] * e[2] * e[0],
+            ]);
+            broken += usize::from(bad);
+            // Along a rim both ends are one unknown, and their difference is nothing.
+            let half: [f64; 3] = std::array::from_fn(|k| {
+                if corners[k] == corners[(k + 1) % 3] {
+                    0.0
+                } else {
+                    0.5 * cot[k]
+                }
+            });
+            for k in 0..3 {
+                // `angle[k]` lies opposite side k, that is at corner k + 2; sides k and k − 1 meet at corner k.
+                let sums = &mut self.sums[at[k]];
+                sums[0] += angle[(k + 1) % 3];
+                sums[1] += half[k] + half[(k + 2) % 3];
+                self.hessian[sides[k] as usize] -= half[k];
+            }
+        }
+        let pattern = self.cholesky.pattern();
+        for i in 0..self.count {
+            gradient[i] = target[i] - self.sums[i][0];
+            self.hessian[pattern.diagonal(i)] = self.sums[i][1];
+        }
+        gradient[self.count] = 0.0;
+        Ok(broken)
+    }
+
+    fn step(
+        &mut self,
+        gradient: &[f64],
+        forcing: Option<f64>,
+        step: &mut [f64],
+    ) -> Result<(), FactorError> {
+        match forcing {
+            None => {
+                self.factor_start()?;
+                self.solve_downhill(gradient, step);
+            }
+            Some(forcing) => {
+                let fresh = self.factored == Factored::Nothing;
+                if fresh || !self.conjugate_gradients(gradient, forcing, step) {
+                    self.factor()?;
+                    self.factored = Factored::Other;
+                    self.solve_downhill(gradient, step);
+                }
+            }
+        }
+        step[self.count] = 0.0;
+        Ok(())
     }
 }
 

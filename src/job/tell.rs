@@ -52,7 +52,7 @@ pub(crate) fn warnings(
     }
     if !flat.metric.broken.is_empty() {
         warnings.push(format!(
-            "{} faces of the mesh are too thin for the conformal map and were taken as flat lines: remesh evenly for a better map",
+            "{} faces of the mesh are too thin for the conformal map and lie on the sheet as lines or turned over: remesh evenly for a better map",
             flat.metric.broken.len()
         ));
     }
@@ -261,6 +261,7 @@ pub(crate) fn figures(
             "straight_rims": flat.singularities.straight_rims(),
             "distortion_of_fit": shape.distortion,
             "broken_faces": flat.metric.broken.len(),
+            "flipped_edges": flat.metric.flips,
             "lambda_min": flat.scale.min,
             "lambda_max": flat.scale.max,
             "lambda_max_at_mm": surface.position(flat.scale.max_vertex).coords.as_slice(),
