@@ -274,3 +274,86 @@ fn distance(p: Vector2<f64>, a: Vector2<f64>, b: Vector2<f64>) -> f64 {
     let part = (p - a).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE);
     (p - a - along * part.clamp(0.0, 1.0)).norm()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::progress::Silent;
+    use crate::conformal::{ConeRequest, FlattenOptions, Sizing, flatten};
+    use crate::mesh::Sample;
+
+    fn turned(points: &[(f64, f64)], angle: f64) -> Vec<Point2<f64>> {
+        let turn = nalgebra::Rotation2::new(angle);
+        points
+            .iter()
+            .map(|p| turn * Point2::new(p.0, p.1))
+            .collect()
+    }
+
+    /// An arrowhead: one of its two long sides is the hem, its axis stands on the base.
+    #[test]
+    fn hem_and_axis_of_an_arrowhead_turn_with_it() {
+        let outline = [(-50.0, 0.0), (50.0, 0.0), (0.0, 95.0), (-50.0, 0.0)];
+        for angle in [0.0, 0.3, 1.2, 2.9] {
+            let line = turned(&outline, angle);
+            let period = |x: f64| x - (x / PI).round() * PI;
+            let found = hem(std::slice::from_ref(&line), 20.0).unwrap();
+            let side = (95f64).atan2(-50.0) + angle;
+            let other = (-95f64).atan2(-50.0) + angle;
+            assert!(period(found - side).abs().min(period(found - other).abs()) < 1e-9);
+            let across = axis(&sampled(&line, 1.0), 5.0).unwrap();
+            assert!(period(across - angle - PI / 2.0).abs() < 0.01, "{across}");
+            assert!(hem(std::slice::from_ref(&line), 150.0).is_none());
+        }
+    }
+
+    /// All axes are a circle's, no axis a crooked quadrilateral's.
+    #[test]
+    fn a_circle_and_a_crooked_shape_have_no_axis() {
+        let circle: Vec<Point2<f64>> = (0..360)
+            .map(|n| f64::from(n).to_radians().sin_cos())
+            .map(|(sin, cos)| Point2::new(80.0 * cos, 80.0 * sin))
+            .collect();
+        assert_eq!(axis(&circle, 5.0), None);
+        let crooked = turned(
+            &[
+                (0.0, 0.0),
+                (90.0, 10.0),
+                (60.0, 70.0),
+                (-40.0, 50.0),
+                (0.0, 0.0),
+            ],
+            0.4,
+        );
+        assert_eq!(axis(&sampled(&crooked, 1.0), 5.0), None);
+    }
+
+    /// The direction found leaves at least as much of a saddle as any of a finer search, but for the part that a
+    /// symmetric outline may cost.
+    #[test]
+    fn no_direction_keeps_clearly_more_of_a_saddle() {
+        let surface = Sample::parse("saddle:faces=3000")
+            .unwrap()
+            .generate()
+            .unwrap();
+        let options = FlattenOptions {
+            sigma: 2.0,
+            sizing: Sizing::Triangles(600.0),
+            cone_clearance: 0.7,
+        };
+        let flat = flatten(&surface, &ConeRequest::Auto, &options, &Silent).unwrap();
+        let found = search(&surface, &flat.layout, flat.edge_mm, &Silent).unwrap();
+        let count = |deg: f64| {
+            let lattice = Lattice::new(flat.edge_mm, deg.to_radians());
+            kept(&surface, &flat.layout, &lattice, flat.edge_mm, &Silent).unwrap() as f64
+        };
+        let best = (-15..15)
+            .map(|n| count(2.0 * f64::from(n)))
+            .fold(0.0, f64::max);
+        assert!(
+            count(found) >= 0.99 * best,
+            "{} at {found}° against {best}",
+            count(found)
+        );
+    }
+}
