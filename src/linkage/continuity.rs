@@ -17,6 +17,7 @@ use nalgebra::{Complex, ComplexField as _, DMatrix, Point2};
 
 use super::LinkageError;
 use super::lattice::Lattice;
+use super::orientation;
 use crate::base::ids::Per;
 use crate::base::progress::Progress;
 use crate::base::sparse::{Cholesky, Pattern};
@@ -32,6 +33,17 @@ const SIZE_ROOM: f64 = 0.04;
 /// rather swells a little than loses its angles.
 const STRETCH_WEIGHT: f64 = 1e-3;
 
+/// Lattices whose warp costs no more than this times the least, and no more than [`EQUAL_DISTORTION`] anyway, are equal
+/// as far as the seams go; then the one that covers most of the sheet is taken. 10⁻³ is far below the angles that a
+/// layout is off by itself.
+const EQUAL_PRICE: f64 = 1.1;
+/// See [`EQUAL_PRICE`]; root mean square, as [`Fitted::distortion`].
+const EQUAL_DISTORTION: f64 = 1e-3;
+/// Lattices compared at most: each is laid for it.
+const COMPARED: usize = 6;
+/// A part of the sheet too small to leave the order of the candidates for.
+const EQUAL_COVER: f64 = 1e-3;
+
 /// A lattice that goes on across the seams of a layout.
 #[derive(Clone, Debug)]
 pub struct Fitted {
@@ -46,7 +58,9 @@ pub struct Fitted {
     pub distortion: f64,
 }
 
-/// Fits a lattice of about `edge_mm`, exactly that if `exact`, and of the given orientation (any if `None`).
+/// Fits a lattice of about `edge_mm`, exactly that if `exact`, and of the given orientation. Where that is `None`, the
+/// seams decide, and what they leave open is taken so that rims cost fewest triangles, or a straight hem or the mirror
+/// axis of the outline is followed if that costs next to none.
 ///
 /// # Errors
 /// [`LinkageError::NoLattice`] if every rounding would fold the chart over; interruption, memory.
@@ -60,15 +74,18 @@ pub fn fit(
 ) -> Result<Fitted, LinkageError> {
     let mut layout = layout.clone();
     let frame = Frame::new(surface, &mut layout);
-    let given = orientation_deg.unwrap_or(0.0);
     if frame.values.iter().all(|x| x.modulus() == 0.0) {
         let corners = layout.corners.clone();
         let exact = frame.transitions(surface, &frame.values);
         layout.set_chart(surface, corners, &exact);
+        let orientation_deg = match orientation_deg {
+            Some(given) => given,
+            None => orientation::search(surface, &layout, edge_mm, progress)?,
+        };
         return Ok(Fitted {
             layout,
             edge_mm,
-            orientation_deg: given,
+            orientation_deg,
             distortion: 0.0,
         });
     }
@@ -76,19 +93,56 @@ pub fn fit(
     let warp = Warp::new(surface, &layout, &frame)?;
     progress.check()?;
     let area = layout.area_mm2();
-    for candidate in candidates(&frame.values, &warp.price, edge_mm, exact, orientation_deg) {
+    let many = area > super::MOST_TRIANGLES as f64 * edge_mm * edge_mm;
+    let choose = orientation_deg.is_none() && !surface.rims().is_empty() && !many;
+    let rounding = Rounding {
+        values: &frame.values,
+        root_place: &frame.root_place,
+        price: &warp.price,
+    };
+    let found = candidates(&rounding, edge_mm, exact, orientation_deg);
+    let least = found.first().map_or(0.0, |c| c.price);
+    // The part of the sheet that it covers, and the lattice that does so best.
+    let mut best: Option<(f64, Fitted)> = None;
+    let mut tried: Vec<Candidate> = Vec::new();
+    for candidate in found {
         let (edge_mm, orientation_deg) = (candidate.edge_mm, candidate.orientation_deg);
-        let lattice = Lattice::new(edge_mm, orientation_deg.to_radians());
-        let rounded: Vec<C> = frame.values.iter().map(|&x| lattice.nearest(x)).collect();
-        let fitted = warp.apply(surface, &layout, &frame, &rounded, &lattice);
-        if let Some(layout) = fitted {
-            return Ok(Fitted {
-                layout,
-                edge_mm,
-                orientation_deg,
-                distortion: (candidate.price / area).sqrt(),
-            });
+        let as_good = candidate.price <= EQUAL_PRICE * least + EQUAL_DISTORTION.powi(2) * area;
+        if best.is_some() && (tried.len() >= COMPARED || !as_good) {
+            break;
         }
+        if tried.iter().any(|c| c.same_lattice(&candidate)) {
+            continue;
+        }
+        tried.push(candidate);
+        progress.check()?;
+        let lattice = Lattice::new(edge_mm, orientation_deg.to_radians());
+        let unit = C::from_polar(edge_mm, orientation_deg.to_radians());
+        let rounded: Vec<C> = rounding
+            .whole(unit)
+            .iter()
+            .map(|n| lattice.nearest(n * unit))
+            .collect();
+        let Some(warped) = warp.apply(surface, &layout, &frame, &rounded, &lattice) else {
+            continue;
+        };
+        let fitted = Fitted {
+            layout: warped,
+            edge_mm,
+            orientation_deg,
+            distortion: (candidate.price / area).sqrt(),
+        };
+        if !choose {
+            return Ok(fitted);
+        }
+        let kept = orientation::kept(surface, &fitted.layout, &lattice, edge_mm, progress)?;
+        let covered = kept as f64 * edge_mm * edge_mm / area;
+        if best.as_ref().is_none_or(|b| covered > b.0 + EQUAL_COVER) {
+            best = Some((covered, fitted));
+        }
+    }
+    if let Some((_, fitted)) = best {
+        return Ok(fitted);
     }
     Err(LinkageError::NoLattice { edge_mm })
 }
@@ -139,6 +193,9 @@ struct Frame {
     turns: Vec<C>,
     /// The cones.
     seats: BTreeMap<VertexId, Seat>,
+    /// On a closed surface the place of the root's cone follows from the free values too: what is turned by all other
+    /// cones and handles together turns about it. How far each value moves it; empty where there is no such cone.
+    root_place: Vec<C>,
 }
 
 impl Frame {
@@ -198,6 +255,7 @@ impl Frame {
             segment_of,
             turns: layout.segments.iter().map(|s| s.transition.turn).collect(),
             seats: BTreeMap::new(),
+            root_place: Vec::new(),
         };
         let is_cone = |v: VertexId| layout.cones.iter().any(|c| c.vertex == v);
         if let Some(Node::Vertex(v)) = root
@@ -226,7 +284,26 @@ impl Frame {
             }
         }
         frame.move_origin(layout);
+        if let Some((&vertex, _)) = frame.seats.iter().find(|(_, s)| s.value.is_none()) {
+            let unit = |k: usize| {
+                let mut values = vec![C::new(0.0, 0.0); frame.values.len()];
+                values[k] = C::new(1.0, 0.0);
+                frame.centre(surface, vertex, &values)
+            };
+            frame.root_place = (0..frame.values.len()).map(unit).collect();
+        }
         frame
+    }
+
+    /// What the transitions around a cone turn about, in the chart of its first wedge.
+    fn centre(&self, surface: &Surface, vertex: VertexId, values: &[C]) -> C {
+        let over = self.transitions(surface, values);
+        let mut around = Transition::IDENTITY;
+        let spokes: Vec<HalfedgeId> = surface.around(vertex).collect();
+        for &h in spokes.iter().skip(1).chain(spokes.first()) {
+            around = around.then(&self.across(&over, h).inverse());
+        }
+        around.shift / (C::new(1.0, 0.0) - around.turn)
     }
 
     fn free(&mut self, segment: usize, shift: C) {
@@ -494,7 +571,7 @@ impl Warp {
     }
 
     /// Displacements of the cones in their first wedges, 0 elsewhere, where free value `changed` grows by 1: it moves its
-    /// cone in the wedge in which it was measured.
+    /// cone in the wedge in which it was measured, and the root's.
     fn cone_displacements(
         &self,
         surface: &Surface,
@@ -505,7 +582,11 @@ impl Warp {
         let mut d = Per::filled(surface.positions().len(), C::new(0.0, 0.0));
         for (vertex, seat) in &frame.seats {
             let key = (seat.at.face(), seat.at.corner());
-            let there = C::new(f64::from(u8::from(seat.value == Some(changed))), 0.0);
+            let own = C::new(f64::from(u8::from(seat.value == Some(changed))), 0.0);
+            let there = match seat.value {
+                Some(_) => own,
+                None => frame.root_place.get(changed).copied().unwrap_or_default(),
+            };
             if let (Some(motion), Some(offset)) = (self.wedges.get(&key), offsets.get(&key)) {
                 d[*vertex] = motion.turn.conj() * (there - offset);
             }
@@ -623,51 +704,108 @@ struct Candidate {
     score: f64,
 }
 
+impl Candidate {
+    fn same_lattice(&self, other: &Self) -> bool {
+        let turn = (self.orientation_deg - other.orientation_deg) / 60.0;
+        (self.edge_mm / other.edge_mm - 1.0).abs() < 1e-6 && (turn - turn.round()).abs() < 1e-7
+    }
+}
+
 /// Sizes and orientations tried on a grid before the best are refined.
 const GRID: (usize, usize) = (33, 240);
 /// Grid points refined.
 const REFINED: usize = 40;
 
+/// How free values become whole.
+struct Rounding<'a> {
+    values: &'a [C],
+    /// See [`Frame::root_place`].
+    root_place: &'a [C],
+    price: &'a DMatrix<C>,
+}
+
+impl Rounding<'_> {
+    /// Lattice vectors, of a lattice whose first edge is `unit`, for the free values, in units of it: the nearest; or,
+    /// where those would turn the root's cone about the middle of a triangle, which a turn by 120° can, the cheapest
+    /// for which one value goes to a neighbour instead.
+    fn whole(&self, unit: C) -> Vec<C> {
+        let one = Lattice::new(1.0, 0.0);
+        let mut whole: Vec<C> = self.values.iter().map(|x| one.nearest(x / unit)).collect();
+        let place: C = self.root_place.iter().zip(&whole).map(|(c, n)| c * n).sum();
+        let off = |z: C| (one.nearest(z) - z).modulus() > 0.1;
+        if !off(place) {
+            return whole;
+        }
+        let rest: Vec<C> = whole
+            .iter()
+            .zip(self.values)
+            .map(|(n, x)| unit * n - x)
+            .collect();
+        let pull: Vec<C> = (0..rest.len())
+            .map(|i| (0..rest.len()).map(|j| self.price[(i, j)] * rest[j]).sum())
+            .collect();
+        let mut best: Option<(f64, usize, C)> = None;
+        for (k, part) in self.root_place.iter().enumerate() {
+            for turn in 0..6 {
+                let step = one.nearest(C::from_polar(1.0, f64::from(turn) * PI / 3.0));
+                if off(place + part * step) {
+                    continue;
+                }
+                let by = unit * step;
+                let more =
+                    2.0 * (by.conj() * pull[k]).re + by.modulus_squared() * self.price[(k, k)].re;
+                if best.is_none_or(|b| more < b.0) {
+                    best = Some((more, k, step));
+                }
+            }
+        }
+        if let Some((_, k, step)) = best {
+            whole[k] += step;
+        }
+        whole
+    }
+
+    fn form(&self, a: &[C], b: &[C]) -> C {
+        let mut sum = C::new(0.0, 0.0);
+        for (i, x) in a.iter().enumerate() {
+            for (j, y) in b.iter().enumerate() {
+                sum += x.conj() * self.price[(i, j)] * y;
+            }
+        }
+        sum
+    }
+
+    /// What a warp to the lattice costs.
+    fn cost(&self, unit: C) -> f64 {
+        let whole = self.whole(unit);
+        let off: Vec<C> = whole
+            .iter()
+            .zip(self.values)
+            .map(|(n, x)| unit * n - x)
+            .collect();
+        self.form(&off, &off).re.max(0.0)
+    }
+}
+
 /// Lattices around the wanted one, the best first.
 fn candidates(
-    values: &[C],
-    price: &DMatrix<C>,
+    rounding: &Rounding<'_>,
     edge_mm: f64,
     exact: bool,
     orientation_deg: Option<f64>,
 ) -> Vec<Candidate> {
-    let scale: f64 = values
+    let scale: f64 = rounding
+        .values
         .iter()
         .map(|x| x.modulus_squared())
         .sum::<f64>()
         .max(1e-300);
-    let whole = |s: C| -> Vec<C> {
-        let unit = Lattice::new(1.0, 0.0);
-        values.iter().map(|x| unit.nearest(x / s)).collect()
-    };
-    let form = |a: &[C], b: &[C]| -> C {
-        let mut sum = C::new(0.0, 0.0);
-        for (i, x) in a.iter().enumerate() {
-            for (j, y) in b.iter().enumerate() {
-                sum += x.conj() * price[(i, j)] * y;
-            }
-        }
-        sum
-    };
-    let cost = |s: C| -> f64 {
-        let off: Vec<C> = whole(s)
-            .iter()
-            .zip(values)
-            .map(|(n, x)| s * n - x)
-            .collect();
-        form(&off, &off).re.max(0.0)
-    };
     let (sizes, angles) = (
         if exact { 1 } else { GRID.0 },
         if orientation_deg.is_some() { 1 } else { GRID.1 },
     );
     let make = |edge: f64, deg: f64| {
-        let found = cost(C::from_polar(edge, deg.to_radians()));
+        let found = rounding.cost(C::from_polar(edge, deg.to_radians()));
         let away = (edge / edge_mm).ln() / SIZE_ROOM;
         Candidate {
             edge_mm: edge,
@@ -695,9 +833,9 @@ fn candidates(
     for candidate in &mut all {
         for _ in 0..10 {
             let at = C::from_polar(candidate.edge_mm, candidate.orientation_deg.to_radians());
-            let n = whole(at);
+            let n = rounding.whole(at);
             // Least squares for the complex scale s of s·n ≈ x.
-            let (above, below) = (form(&n, values), form(&n, &n).re);
+            let (above, below) = (rounding.form(&n, rounding.values), rounding.form(&n, &n).re);
             if below <= 0.0 {
                 break;
             }

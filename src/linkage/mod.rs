@@ -14,6 +14,7 @@ mod lattice;
 mod lift;
 mod net;
 mod obj;
+mod orientation;
 mod pieces;
 mod seam;
 mod types;
