@@ -157,22 +157,63 @@ pub fn to_goals(
     }))
 }
 
+/// Vertices from which a loop around a handle is looked for. Of all loops the shortest passes near some of them.
+const ROOTS: usize = 48;
+
 /// Loops that open all handles: one for each, around it the short way. The surface keeps its rims, gains two for each
 /// loop, and has genus 0.
 ///
 /// # Errors
-/// As [`slit_along`].
+/// [`ConformalError::Dart`] if no loop opens a handle that is left.
 pub fn around_handles(surface: &Surface) -> Result<Vec<Dart>, ConformalError> {
-    let mut chosen: Vec<Dart> = Vec::new();
-    let mut genus = surface.genus();
-    let root = VertexId::from_index(0);
+    let mut darts: Vec<Dart> = Vec::new();
+    let mut open = surface.clone();
+    while open.genus() > 0 {
+        // Copies of vertices along earlier loops go by the names of the originals.
+        let mut original = Per::<VertexId, VertexId>::filled(open.positions().len(), VertexId(0));
+        for (face, v) in open.faces().iter_ids() {
+            (0..3).for_each(|k| original[v[k]] = surface.faces()[face][k]);
+        }
+        let step = (open.positions().len() / ROOTS).max(1);
+        let mut candidates: Vec<(f64, Vec<VertexId>)> = open
+            .positions()
+            .ids()
+            .step_by(step)
+            .flat_map(|root| loops_from(&open, root))
+            .collect();
+        candidates.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut last = ConformalError::DartTooShort;
+        let mut found = false;
+        for (_, stops) in candidates {
+            let stops = stops.into_iter().map(|v| original[v]).collect();
+            darts.push(Dart { stops });
+            match slit_along(surface, &darts) {
+                Ok(slit) if slit.genus() < open.genus() => {
+                    open = slit;
+                    found = true;
+                    break;
+                }
+                Ok(_) => {}
+                Err(error) => last = error,
+            }
+            darts.pop();
+        }
+        if !found {
+            return Err(last);
+        }
+    }
+    Ok(darts)
+}
+
+/// The generating loops from a root, each with its length and without the stem that its two ways share.
+fn loops_from(surface: &Surface, root: VertexId) -> Vec<(f64, Vec<VertexId>)> {
     let mut paths = ShortestPaths::new(surface);
     paths.extend(&[root], |_| false);
     let none = on_both_sides(surface, &[]);
-    let mut candidates: Vec<(f64, Dart)> = loops(surface, &paths, &none)
+    loops(surface, &paths, &none)
         .into_iter()
         .map(|h| {
-            // Out from the root to the edge, across it, and back; the stem that both ways share is left out.
+            // Out from the root to the edge, across it, and back.
             let way = |v: VertexId| {
                 let mut way: Vec<VertexId> = vec![v];
                 way.extend(paths.back(v).map(|h| surface.tail(h)));
@@ -189,23 +230,9 @@ pub fn around_handles(surface: &Surface) -> Result<Vec<Dart>, ConformalError> {
             stops.extend(back.into_iter().rev());
             stops.push(branch);
             let gap = |p: &[VertexId]| (surface.position(p[1]) - surface.position(p[0])).norm();
-            (stops.windows(2).map(gap).sum(), Dart { stops })
+            (stops.windows(2).map(gap).sum(), stops)
         })
-        .collect();
-    candidates.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for (_, dart) in candidates {
-        if genus == 0 {
-            break;
-        }
-        chosen.push(dart);
-        match slit_along(surface, &chosen) {
-            Ok(slit) if slit.genus() < genus => genus = slit.genus(),
-            _ => {
-                chosen.pop();
-            }
-        }
-    }
-    Ok(chosen)
+        .collect()
 }
 
 #[cfg(test)]
@@ -227,6 +254,15 @@ mod tests {
             (0, 2, 0)
         );
         assert_eq!(tube.rims()[0].len(), tube.rims()[1].len());
+    }
+
+    #[test]
+    fn two_short_loops_open_a_double_torus() {
+        let sample = Sample::parse("double_torus:faces=2000").and_then(|s| s.generate());
+        let surface = sample.unwrap();
+        let darts = around_handles(&surface).unwrap();
+        let open = slit_along(&surface, &darts).unwrap();
+        assert_eq!((darts.len(), open.genus(), open.rims().len()), (2, 0, 4));
     }
 
     #[test]

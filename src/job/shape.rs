@@ -249,7 +249,23 @@ fn attempt(
     progress: &dyn Progress,
 ) -> Result<Shape, MakeError> {
     let mut left_out = request.left_out.clone().unwrap_or_default();
-    let laid = lay_out(request, &map, &left_out, stock.sigma, progress)?;
+    let mut laid = lay_out(request, &map, &left_out, stock.sigma, progress)?;
+    if request.left_out.is_none() && !laid.built.slots.is_empty() {
+        // A slot without width cannot be cut: its later triangle goes.
+        let numbers = |built: &Built| {
+            let later = built.slots.iter().map(|s| built.numbers[s.1.0 as usize]);
+            later.collect::<std::collections::BTreeSet<u32>>()
+        };
+        left_out.extend(numbers(&laid.built));
+        laid.built = build_without(
+            &map.ground.surface,
+            &laid.flat.layout,
+            &laid.lattice,
+            &left_out,
+            progress,
+        )
+        .map_err(MakeError::Linkage)?;
+    }
     progress.note(&describe_map(&laid.flat, &map.ground.surface, stock.sigma));
     let (flat, lattice) = (laid.flat.clone(), laid.lattice);
     let (orientation_deg, distortion) = (laid.orientation_deg, laid.distortion);

@@ -67,6 +67,9 @@ pub struct Built {
     pub numbers: Vec<u32>,
     /// Pairs of triangles that lie on one another on the sheet: none, or a mistake of this program.
     pub overlaps: Vec<(TriangleId, TriangleId)>,
+    /// Pairs of triangles that lie side by side on the sheet and are not joined, because a rim of the surface runs between
+    /// them: a slot without width.
+    pub slots: Vec<(TriangleId, TriangleId)>,
     /// Pieces of the sheet: more than one where it would lie on itself otherwise.
     pub pieces: usize,
     /// Length of the seam in lattice edges; 0 without.
@@ -198,10 +201,44 @@ pub fn build_without(
         removed,
         numbers: kept.iter().map(|l| l.number).collect(),
         overlaps: flat.overlaps.iter().map(|&(a, b)| (id(a), id(b))).collect(),
+        slots: slots(&kept, &flat.corners, edge_mm)
+            .into_iter()
+            .map(|(a, b)| (id(a), id(b)))
+            .collect(),
         pieces: flat.pieces,
         seam_edges: flat.seam_edges,
         flaps: flat.flaps,
     })
+}
+
+/// Pairs of triangles with a common side on the sheet that are no neighbours.
+fn slots(kept: &[clip::Laid], flat: &[[Point2<f64>; 3]], edge_mm: f64) -> Vec<(usize, usize)> {
+    // Middles of sides lie on a lattice of half the edge: rounding to a hundredth of it finds the same ones.
+    let key = |t: usize, side: usize| {
+        let middle = nalgebra::center(&flat[t][side], &flat[t][(side + 1) % 3]);
+        let whole = |x: f64| (x * 100.0 / edge_mm).round() as i64;
+        (whole(middle.x), whole(middle.y))
+    };
+    let near =
+        |(x, y): (i64, i64)| (-1..=1).flat_map(move |i| (-1..=1).map(move |j| (x + i, y + j)));
+    let mut there = std::collections::HashMap::new();
+    let mut found = Vec::new();
+    for t in 0..kept.len() {
+        for side in 0..3 {
+            let here = key(t, side);
+            match near(here).find_map(|k| there.get(&k).copied()) {
+                Some(other) => {
+                    if kept[t].neighbours[side].is_none_or(|n| n.0 != other) {
+                        found.push((other, t));
+                    }
+                }
+                None => {
+                    there.insert(here, t);
+                }
+            }
+        }
+    }
+    found
 }
 
 /// Width and height of a layout, millimetres.
