@@ -372,8 +372,8 @@ impl<'f> Pricer<'f> {
             }
             let step = slope / bend;
             self.start -= step;
-            if step.abs() < 1e-4 {
-                // What a last step would still gain.
+            if step.abs() < 1e-2 {
+                // What this step gains: exact as long as no sample crosses an end of the window on it.
                 return value - 0.5 * slope * step;
             }
         }
@@ -389,13 +389,11 @@ impl<'f> Pricer<'f> {
             let off = x - start - 0.5 * window;
             let below = (start - x).max(0.0);
             let above = (x - start - window).max(0.0);
-            let (is_below, is_above) = (
-                f64::from(u8::from(below > 0.0)),
-                f64::from(u8::from(above > 0.0)),
-            );
+            let steep = if below > 0.0 { PRICE_BELOW } else { 0.0 };
+            let flat = if above > 0.0 { 1.0 } else { 0.0 };
             value[k] += w * (PRICE_BELOW * below * below + above * above + UNEVEN * off * off);
             slope[k] += w * 2.0 * (PRICE_BELOW * below - above - UNEVEN * off);
-            bend[k] += w * 2.0 * (PRICE_BELOW * is_below + is_above + UNEVEN);
+            bend[k] += w * 2.0 * (steep + flat + UNEVEN);
         };
         let (xs, ws) = (
             self.trial.chunks_exact(4),

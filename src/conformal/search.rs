@@ -42,7 +42,9 @@ const POLISHED: usize = 2;
 /// Rounds of moving all cones over one distance.
 const ROUNDS: usize = 6;
 /// A change must lower the price by this part, so that rounding cannot keep the search going around.
-const GAIN: f64 = 1e-6;
+const GAIN: f64 = 1e-5;
+/// Changes in one descent, at the most: far more than any has taken.
+const CHANGES: usize = 100;
 
 /// Sets of singularities worth mapping, the best first: what the search ended with, the next best ends, and what it
 /// passed on its way.
@@ -169,7 +171,7 @@ impl Searcher {
         progress: &dyn Progress,
     ) -> Result<(f64, Set), ConformalError> {
         let mut price = Pricer::new(&self.field, &best).price();
-        loop {
+        for _ in 0..CHANGES {
             progress.check()?;
             let must = self.field.missing(&best) != 0;
             // The best change; one that places curvature that has to be placed is taken at any price.
@@ -197,6 +199,7 @@ impl Searcher {
                 passed.push(best.clone());
             }
         }
+        Ok((price, best))
     }
 
     /// All single changes; while curvature is missing, only those that place some.

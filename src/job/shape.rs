@@ -4,6 +4,7 @@
 //! come from [`maps`], the most promising first; where cones are left to the program and none of them is within reach,
 //! the surface is opened by a dart where it is worst, and mapped again.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{Point2, Point3};
@@ -16,7 +17,8 @@ use super::verdict::{Verdict, place};
 use crate::base::progress::Progress;
 use crate::base::units::short;
 use crate::conformal::{
-    ConformalError, Dart, FlattenOptions, Flattened, Sizing, around_handles, patches, to_goals,
+    ConformalError, Dart, FlattenOptions, Flattened, Layout, Sizing, around_handles, patches,
+    to_goals,
 };
 use crate::linkage::{Built, Flaps, Linkage, LinkageOptions, build_without, fit};
 use crate::machine::Machine;
@@ -82,6 +84,8 @@ const PROMISING: f64 = 0.7;
 
 /// Where a linkage fails by a few triangles only, it is made again without them, so often at the most.
 const MENDED: usize = 4;
+/// Rounds of closing slots.
+const MOST_SLOTS: usize = 8;
 /// Part of all triangles that may be left out like this.
 const MOST_LEFT_OUT: f64 = 0.015;
 
@@ -250,21 +254,16 @@ fn attempt(
 ) -> Result<Shape, MakeError> {
     let mut left_out = request.left_out.clone().unwrap_or_default();
     let mut laid = lay_out(request, &map, &left_out, stock.sigma, progress)?;
-    if request.left_out.is_none() && !laid.built.slots.is_empty() {
-        // A slot without width cannot be cut: its later triangle goes.
-        let numbers = |built: &Built| {
-            let later = built.slots.iter().map(|s| built.numbers[s.1.0 as usize]);
-            later.collect::<std::collections::BTreeSet<u32>>()
-        };
-        left_out.extend(numbers(&laid.built));
-        laid.built = build_without(
-            &map.ground.surface,
-            &laid.flat.layout,
-            &laid.lattice,
-            &left_out,
+    if request.left_out.is_none() {
+        let (layout, lattice) = (&laid.flat.layout, &laid.lattice);
+        close_slots(
+            &map,
+            layout,
+            lattice,
+            &mut laid.built,
+            &mut left_out,
             progress,
-        )
-        .map_err(MakeError::Linkage)?;
+        )?;
     }
     progress.note(&describe_map(&laid.flat, &map.ground.surface, stock.sigma));
     let (flat, lattice) = (laid.flat.clone(), laid.lattice);
@@ -284,8 +283,10 @@ fn attempt(
         }
         progress.note(&format!("left out: {} triangles", left_out.len()));
         let surface = &map.ground.surface;
-        let built = build_without(surface, &flat.layout, &lattice, &left_out, progress)
+        let mut built = build_without(surface, &flat.layout, &lattice, &left_out, progress)
             .map_err(MakeError::Linkage)?;
+        let layout = &flat.layout;
+        close_slots(&map, layout, &lattice, &mut built, &mut left_out, progress)?;
         let laid = Laid {
             flat: flat.clone(),
             built,
@@ -300,6 +301,33 @@ fn attempt(
         failing = mended.failing(request, stock, closest);
     }
     Ok(first)
+}
+
+/// Leaves out triangles until the sheet has no slot without width, which could not be cut. Where triangles go, its seam
+/// may run otherwise and leave a new one.
+fn close_slots(
+    map: &Map,
+    layout: &Layout,
+    lattice: &LinkageOptions,
+    built: &mut Built,
+    left_out: &mut Vec<u32>,
+    progress: &dyn Progress,
+) -> Result<(), MakeError> {
+    for _ in 0..MOST_SLOTS {
+        let later: BTreeSet<u32> = built
+            .slots
+            .iter()
+            .map(|slot| built.numbers[slot.1.0 as usize])
+            .collect();
+        if later.is_empty() {
+            break;
+        }
+        left_out.extend(later);
+        left_out.sort_unstable();
+        *built = build_without(&map.ground.surface, layout, lattice, left_out, progress)
+            .map_err(MakeError::Linkage)?;
+    }
+    Ok(())
 }
 
 /// Solves and judges a linkage, and draws its sheet.
