@@ -78,6 +78,8 @@ pub(crate) struct Shape {
 const TRIED: usize = 4;
 /// Darts at the most that the program opens by itself, beside those that open handles.
 const MOST_DARTS: usize = 8;
+/// Maps tried without a dart that is to be taken back.
+const RETRIED: usize = 2;
 /// While there are darts to try, a map is laid out only if its misfit is smaller, in L: the sheet then misses the
 /// surface by about a third of that.
 const PROMISING: f64 = 0.7;
@@ -104,10 +106,11 @@ pub(crate) fn shape(
         && request.turnings.is_none()
         && request.straight.is_empty();
     let mut tries = Tries::default();
-    let opened = darts.len();
+    // Darts that are no proposal to be taken back: those asked for, and those that open handles.
+    let mut fixed = darts.len();
     loop {
         let ground = Arc::new(Ground::new(original, &darts).map_err(MakeError::Conformal)?);
-        free &= darts.len() < opened + MOST_DARTS;
+        free &= darts.len() < fixed + MOST_DARTS;
         let found = match maps(
             request,
             loaded.cones.as_deref(),
@@ -120,8 +123,14 @@ pub(crate) fn shape(
             )) if free && ground.surface.genus() > 0 => {
                 // The pattern does not close around the handles.
                 darts.extend(around_handles(original).map_err(MakeError::Conformal)?);
+                fixed = darts.len();
                 progress.note(&format!("the handles are cut open: {error}"));
                 continue;
+            }
+            // A dart may leave a surface that cannot be mapped; what was found before it still counts.
+            Err(MakeError::Conformal(error)) if darts.len() > fixed && progress.check().is_ok() => {
+                tries.refused.get_or_insert(MakeError::Conformal(error));
+                break;
             }
             found => found?,
         };
@@ -134,7 +143,7 @@ pub(crate) fn shape(
             if tries.on(&ground) >= TRIED || next.is_some() && !promising {
                 tries.waiting.push(map);
             } else if let Some(shape) = tries.attempt(request, map, stock, closest, progress)? {
-                return Ok(shape);
+                return with_fewer_darts(request, original, shape, fixed, stock, closest, progress);
             }
         }
         let Some(dart) = next else { break };
@@ -153,13 +162,54 @@ pub(crate) fn shape(
             break;
         }
         if let Some(shape) = tries.attempt(request, map, stock, closest, progress)? {
-            return Ok(shape);
+            return with_fewer_darts(request, original, shape, fixed, stock, closest, progress);
         }
     }
     let nothing = || MakeError::Internal("no layout was tried".into());
     tries
         .best
         .ok_or_else(|| tries.refused.unwrap_or_else(nothing))
+}
+
+/// Takes back the darts after the first `fixed`, one by one, that the shape passes without: what an early dart was for,
+/// later ones may have taken over.
+fn with_fewer_darts(
+    request: &Request,
+    original: &Surface,
+    shape: Shape,
+    fixed: usize,
+    stock: &Stock<'_>,
+    closest: &ClosestPoint,
+    progress: &dyn Progress,
+) -> Result<Shape, MakeError> {
+    let mut best = shape;
+    let mut next = fixed;
+    // The last one was needed: it passed with it, and not without.
+    while next + 1 < best.ground.darts.len() {
+        progress.check().map_err(MakeError::Interrupted)?;
+        let mut darts = best.ground.darts.clone();
+        darts.remove(next);
+        next += 1;
+        let Ok(ground) = Ground::new(original, &darts) else {
+            continue;
+        };
+        let Ok(found) = maps(request, None, &Arc::new(ground), stock.sigma, progress) else {
+            continue;
+        };
+        let mut tries = Tries::default();
+        for map in found.into_iter().take(RETRIED) {
+            if map.misfit() > PROMISING {
+                break;
+            }
+            if let Some(shape) = tries.attempt(request, map, stock, closest, progress)? {
+                progress.note("one dart less will do");
+                best = shape;
+                next -= 1;
+                break;
+            }
+        }
+    }
+    Ok(best)
 }
 
 /// The dart that takes up what a map misses most: from where λ is farthest outside to the nearest opening, on a surface
