@@ -27,8 +27,8 @@ pub use dart::{Dart, Patch, around_handles, patches, slit_along, to_goals};
 pub use layout::{Layout, ScaleSummary, Transition};
 pub use metric::{Metric, MetricSolver};
 pub use propose::{
-    ConeRequest, FlattenOptions, Flattened, Sizing, choose_turnings, choose_turnings_with_hems,
-    flatten, vertex_from_number,
+    ConeRequest, FlattenOptions, Flattened, Sizing, Wish, choose_turnings,
+    choose_turnings_with_hems, flatten, proposals, vertex_from_number, with_cones,
 };
 pub use search::{SearchOptions, search};
 

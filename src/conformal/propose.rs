@@ -1,7 +1,8 @@
 //! From a surface to a layout at its true size: which singularities, how large on the sheet, how long the triangle edge.
 
 use super::{
-    Cone, ConformalError, Layout, Metric, MetricSolver, ScaleSummary, Singularities, cut_graph,
+    Cone, ConformalError, Layout, Metric, MetricSolver, ScaleSummary, SearchOptions, Singularities,
+    cut_graph, search,
 };
 use crate::base::progress::Progress;
 use crate::mesh::{Surface, VertexId};
@@ -9,8 +10,7 @@ use crate::mesh::{Surface, VertexId};
 /// Which singularities a person asks for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum ConeRequest {
-    /// None if λ stays within [1, σ] without; otherwise one cone at the vertex of largest λ if that brings more of the
-    /// surface inside.
+    /// None if λ stays within [1, σ] without; otherwise the map of least misfit among the [`proposals`].
     #[default]
     Auto,
     /// Exactly these.
@@ -77,17 +77,120 @@ pub fn flatten(
     match cones {
         ConeRequest::Given(given) => Flattened::solve(&mut solver, given, options, progress),
         ConeRequest::Auto => {
-            let plain = choose_turnings(&mut solver, &[], options, progress)?;
-            let Some(cone) = plain.proposed_cone(surface, options.sigma) else {
-                return Ok(plain);
+            let found = proposals(&mut solver, &Wish::default(), options, progress)?;
+            let least = |a: &Flattened, b: &Flattened| {
+                let misfit = |f: &Flattened| f.scale.misfit_mm / f.edge_mm;
+                misfit(a).total_cmp(&misfit(b))
             };
-            let coned = choose_turnings(&mut solver, &[cone], options, progress)?;
-            Ok(if coned.scale.inside > plain.scale.inside {
-                coned
-            } else {
-                plain
-            })
+            match found.into_iter().min_by(least) {
+                Some(best) => Ok(best),
+                None => {
+                    let none = Singularities::none(surface);
+                    Flattened::solve(&mut solver, &none, options, progress)
+                }
+            }
         }
+    }
+}
+
+/// What is asked for where the cones are left to the program.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Wish {
+    /// Turning of each rim but the first in units of 120°; `None`: what needs least stretch.
+    pub turnings: Option<Vec<i32>>,
+    /// Rims that are straight hems (0-based, ascending).
+    pub straight: Vec<usize>,
+}
+
+/// Sets of singularities that the search proposes and that are mapped.
+const MAPPED: usize = 6;
+
+/// The map with these cones, the rims as wished.
+///
+/// # Errors
+/// [`ConformalError`]: impossible singularities, no convergence, interruption.
+pub fn with_cones(
+    solver: &mut MetricSolver<'_>,
+    cones: &[Cone],
+    wish: &Wish,
+    options: &FlattenOptions,
+    progress: &dyn Progress,
+) -> Result<Flattened, ConformalError> {
+    match &wish.turnings {
+        Some(turnings) => {
+            let given = Singularities {
+                cones: cones.to_vec(),
+                turnings: turnings.clone(),
+                straight: wish.straight.clone(),
+            };
+            Flattened::solve(solver, &given, options, progress)
+        }
+        None => choose_turnings_with_hems(solver, cones, &wish.straight, options, progress),
+    }
+}
+
+/// The maps worth looking at: that without a cone, alone if λ stays within [1, σ]; otherwise also that with the obvious
+/// cone and those that [`search`] proposes. In no order of worth; at least one.
+///
+/// # Errors
+/// [`ConformalError`]: no set of singularities gives a map, interruption.
+pub fn proposals(
+    solver: &mut MetricSolver<'_>,
+    wish: &Wish,
+    options: &FlattenOptions,
+    progress: &dyn Progress,
+) -> Result<Vec<Flattened>, ConformalError> {
+    let surface = solver.surface();
+    progress.start("conformal map", None);
+    let mut refused = None;
+    let mut maps = match with_cones(solver, &[], wish, options, progress) {
+        // A closed surface may need cones.
+        Err(error @ ConformalError::TotalCurvature { .. }) => {
+            refused = Some(error);
+            Vec::new()
+        }
+        plain => vec![plain?],
+    };
+    if maps.first().is_some_and(|m| m.scale.within(options.sigma)) {
+        return Ok(maps);
+    }
+    // The obvious cone; the search may find a better one, or that none is worth its price.
+    let obvious = maps
+        .first()
+        .and_then(|m| m.proposed_cone(surface, options.sigma));
+    if let Some(cone) = obvious {
+        maps.push(with_cones(solver, &[cone], wish, options, progress)?);
+    }
+    progress.start("searching for cones", None);
+    let edge_mm = match options.sizing {
+        Sizing::EdgeMm(edge) => edge,
+        // Half of a surface is about as much as its sheet.
+        Sizing::Triangles(count) => (surface.area() / (2.0 * count * 0.433)).sqrt(),
+    };
+    let asked = SearchOptions {
+        sigma: options.sigma,
+        edge_mm,
+        turnings: wish.turnings.clone(),
+    };
+    let mut sets = search(solver, &asked, progress)?;
+    // The search knows nothing of hems: what it proposes goes where they turn by 0.
+    sets.iter_mut()
+        .for_each(|set| set.straight.clone_from(&wish.straight));
+    sets.retain(|set| set.check(surface).is_ok());
+    let known: Vec<Singularities> = maps.iter().map(|m| m.singularities.clone()).collect();
+    for set in sets.into_iter().filter(|s| !known.contains(s)).take(MAPPED) {
+        match Flattened::solve(solver, &set, options, progress) {
+            Ok(flat) => maps.push(flat),
+            // Cones on a surface with handles rarely close around them.
+            Err(
+                error @ (ConformalError::Holonomy { .. } | ConformalError::NotConverged { .. }),
+            ) => refused = Some(error),
+            Err(error) => return Err(error),
+        }
+    }
+    match refused.filter(|_| maps.is_empty()) {
+        Some(error) => Err(error),
+        None => Ok(maps),
     }
 }
 

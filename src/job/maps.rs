@@ -7,8 +7,8 @@ use super::MakeError;
 use super::request::Request;
 use crate::base::progress::Progress;
 use crate::conformal::{
-    Cone, ConformalError, Dart, FlattenOptions, Flattened, MetricSolver, SearchOptions,
-    Singularities, Sizing, choose_turnings_with_hems, search, slit_along,
+    Cone, ConformalError, Dart, FlattenOptions, Flattened, MetricSolver, Wish, proposals,
+    slit_along, with_cones,
 };
 use crate::mesh::Surface;
 
@@ -16,8 +16,6 @@ use crate::mesh::Surface;
 /// next ring. λ falls to 0 at such a cone, and the finer the triangles, the deeper they reach into the fall.
 const REMOVALS: [usize; 2] = [4, 16];
 
-/// Sets of singularities that the search proposes and that are mapped.
-const MAPPED: usize = 6;
 /// The surface as it is mapped.
 #[derive(Debug)]
 pub(crate) struct Ground {
@@ -88,83 +86,26 @@ pub(crate) fn maps(
         };
         removals(&flat.layout.cones).into_iter().map(map).collect()
     };
-    // With the turnings of the rims as asked for, or those that suit these cones best.
-    let mut with_cones = |cones: &[Cone]| -> Result<Vec<Map>, ConformalError> {
-        progress.start("conformal map", None);
-        let first = options(removals(cones)[0]);
-        let flat = match &request.turnings {
-            Some(turnings) => {
-                let given = Singularities {
-                    cones: cones.to_vec(),
-                    turnings: turnings.clone(),
-                    straight: request.straight.clone(),
-                };
-                Flattened::solve(&mut solver, &given, &first, progress)
-            }
-            None => {
-                choose_turnings_with_hems(&mut solver, cones, &request.straight, &first, progress)
-            }
-        };
-        flat.map(resized)
+    let wish = Wish {
+        turnings: request.turnings.clone(),
+        straight: request.straight.clone(),
     };
-    let mut maps = match given {
-        Some(cones) => with_cones(cones).map_err(MakeError::Conformal)?,
+    let found = match given {
+        Some(cones) => {
+            progress.start("conformal map", None);
+            let first = options(removals(cones)[0]);
+            with_cones(&mut solver, cones, &wish, &first, progress).map(|flat| vec![flat])
+        }
+        // With the clearance of most removed triangles, which shows what the cones are worth.
         None => {
-            let mut refused = None;
-            let mut maps = match with_cones(&[]) {
-                // A closed surface may need cones.
-                Err(error @ ConformalError::TotalCurvature { .. }) => {
-                    refused = Some(error);
-                    Vec::new()
-                }
-                plain => plain.map_err(MakeError::Conformal)?,
-            };
-            if maps.first().is_some_and(|m| m.flat.scale.within(sigma)) {
-                return Ok(maps);
-            }
-            // The obvious cone; the search may find a better one, or that none is worth its price.
-            let obvious = maps
-                .first()
-                .and_then(|m| m.flat.proposed_cone(surface, sigma));
-            if let Some(cone) = obvious {
-                maps.extend(with_cones(&[cone]).map_err(MakeError::Conformal)?);
-            }
-            progress.start("searching for cones", None);
-            let edge_mm = match request.sizing {
-                Sizing::EdgeMm(edge) => edge,
-                // Half of a surface is about as much as its sheet.
-                Sizing::Triangles(count) => (surface.area() / (2.0 * count * 0.433)).sqrt(),
-            };
-            let wish = SearchOptions {
-                sigma,
-                edge_mm,
-                turnings: request.turnings.clone(),
-            };
-            let mut sets = search(&mut solver, &wish, progress).map_err(MakeError::Conformal)?;
-            // The search knows nothing of hems: what it proposes goes where they turn by 0.
-            sets.iter_mut()
-                .for_each(|set| set.straight = request.straight.clone());
-            sets.retain(|set| set.check(surface).is_ok());
-            let known: Vec<Singularities> =
-                maps.iter().map(|m| m.flat.singularities.clone()).collect();
-            for set in sets.into_iter().filter(|s| !known.contains(s)).take(MAPPED) {
-                let first = options(removals(&set.cones)[0]);
-                match Flattened::solve(&mut solver, &set, &first, progress) {
-                    Ok(flat) => maps.extend(resized(flat)),
-                    // Cones on a surface with handles rarely close around them.
-                    Err(
-                        error @ (ConformalError::Holonomy { .. }
-                        | ConformalError::NotConverged { .. }),
-                    ) => refused = Some(error),
-                    Err(error) => return Err(MakeError::Conformal(error)),
-                }
-            }
-            if let Some(error) = refused.filter(|_| maps.is_empty()) {
-                return Err(MakeError::Conformal(error));
-            }
-            maps
+            let most = request
+                .remove_at_cone
+                .unwrap_or(REMOVALS[REMOVALS.len() - 1]);
+            proposals(&mut solver, &wish, &options(most), progress)
         }
     };
+    let found = found.map_err(MakeError::Conformal)?;
+    let mut maps: Vec<Map> = found.into_iter().flat_map(resized).collect();
     // By what they will miss the surface; of those that miss nothing the one that removes least. The sort is stable.
     maps.sort_by(|a, b| a.misfit().total_cmp(&b.misfit()));
     Ok(maps)
