@@ -13,7 +13,7 @@
 //! |---|---|
 //! | [`material`], [`machine`] | TOML → checked profiles |
 //! | [`mesh`] | file or sample → [`mesh::Surface`]: oriented, manifold, millimetres |
-//! | [`conformal`] | surface, cone → [`conformal::Layout`]: flat chart with the scale factor λ |
+//! | [`conformal`] | surface, cones, darts → [`conformal::Layout`]: flat chart with the scale factor λ |
 //! | [`linkage`] | layout, edge length → [`linkage::Linkage`]: rigid triangles and hinges, flat and lifted |
 //! | [`rationalize`] | linkage, surface, σ → positions in space, [`rationalize::Quality`] |
 //! | [`pattern`] | linkage, hinge width, kerf → [`pattern::Sheet`]: slits and contours, as SVG |

@@ -114,7 +114,7 @@ pub(crate) fn maps(
 /// Radius around a cone, in L, that no triangle's centre comes within: 1/√3 with all triangles in place, 2/√3 without
 /// the four at the cone, 2 rings without sixteen; taken a little smaller for the second and third because corners
 /// reach further in than centres.
-fn clearance(removal: usize) -> f64 {
+pub(crate) fn clearance(removal: usize) -> f64 {
     if removal == 0 {
         0.7
     } else {

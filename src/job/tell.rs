@@ -5,10 +5,14 @@ use serde_json::{Value, json};
 use super::cut::CutResult;
 use super::design::Design;
 use super::load::Loaded;
+use super::maps::Ground;
 use super::shape::Shape;
+use super::verdict::place;
 use crate::base::units::short;
+use crate::conformal::Dart;
 use crate::machine::Machine;
 use crate::material::{Material, Source as SigmaSource};
+use crate::mesh::VertexId;
 use crate::pattern::Sheet;
 
 /// What does not forbid the cut but should be known before it.
@@ -75,16 +79,8 @@ pub(crate) fn warnings(
             }
         ));
     }
-    for dart in &shape.ground.darts {
-        let at = |v: crate::mesh::VertexId| super::verdict::place(shape.ground.surface.position(v));
-        let ends = dart.stops.first().zip(dart.stops.last());
-        warnings.push(match ends {
-            Some((a, b)) if a != b => format!(
-                "there is an open cut (a dart) from {} to {}: the pattern does not go on across it, and its sides are only laid together",
-                at(*a), at(*b)
-            ),
-            _ => "there is an open cut around a handle: the pattern does not go on across it, and its sides are only laid together".to_owned(),
-        });
+    if let Some(darts) = darts_in_words(&shape.ground) {
+        warnings.push(darts);
     }
     if built.pieces > 1 {
         warnings.push(format!(
@@ -123,6 +119,26 @@ fn seams(shape: &Shape) -> String {
             edges(bare),
         ),
     }
+}
+
+/// The open cuts, if there are any: where they are and what they mean.
+fn darts_in_words(ground: &Ground) -> Option<String> {
+    let at = |v: &VertexId| place(ground.surface.position(*v));
+    let each = |dart: &Dart| match (dart.stops.first(), dart.stops.last()) {
+        (Some(a), Some(b)) if a != b => format!("from {} to {}", at(a), at(b)),
+        (Some(a), _) => format!("around the handle at {}", at(a)),
+        _ => String::new(),
+    };
+    let list: Vec<String> = ground.darts.iter().map(each).collect();
+    let (count, verb) = match list.len() {
+        0 => return None,
+        1 => ("1 cut (a dart)".to_owned(), "is"),
+        n => (format!("{n} cuts (darts)"), "are"),
+    };
+    Some(format!(
+        "{count} {verb} left open, where no cone takes up the curvature: {}. The pattern does not go on across them; their sides are only laid together",
+        list.join("; ")
+    ))
 }
 
 fn source_in_words(source: SigmaSource) -> &'static str {
@@ -257,6 +273,12 @@ pub(crate) fn figures(
                 "at_mm": surface.position(c.vertex).coords.as_slice(),
                 "units": c.units,
             })).collect::<Vec<_>>(),
+            "darts": shape.ground.darts.iter().map(|d| json!({
+                "vertices": d.stops.iter().map(|v| u64::from(v.0) + 1).collect::<Vec<_>>(),
+                "from_mm": d.stops.first().map(|v| surface.position(*v).coords.as_slice().to_vec()),
+                "to_mm": d.stops.last().map(|v| surface.position(*v).coords.as_slice().to_vec()),
+            })).collect::<Vec<_>>(),
+            "misfit_mm": flat.scale.misfit_mm,
             "rim_turnings_deg": flat.singularities.rim_turnings_deg(),
             "straight_rims": flat.singularities.straight_rims(),
             "distortion_of_fit": shape.distortion,

@@ -163,10 +163,10 @@ fn stretch_advice(flat: &Flattened, surface: &Surface, sigma: f64, cone_tried: b
     let vertex = flat.scale.max_vertex;
     let at = surface.position(vertex);
     let help = if !flat.layout.cones.is_empty() {
-        "another place for the cone (--cone X,Y,Z) or a material with a larger σ may help"
+        "another place for a cone (--cone X,Y,Z), an open cut from there to a rim (--dart), a surface trimmed there, or a material with a larger σ may help"
             .to_owned()
     } else if cone_tried {
-        "a cone there was tried and does not do better; a material with a larger σ, a gentler surface, or a cone elsewhere (--cone X,Y,Z) may help".to_owned()
+        "cones were tried and do not do better; an open cut from there to a rim (--dart), a surface trimmed there, or a material with a larger σ may help".to_owned()
     } else {
         format!(
             "a cone there (--cone auto, or --cone {},{},{}) or a material with a larger σ may help",

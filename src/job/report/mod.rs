@@ -43,6 +43,8 @@ pub struct Page<'a> {
     pub surface: &'a Surface,
     /// Its layout; λ is taken from here.
     pub layout: &'a Layout,
+    /// Radius around each cone, on the sheet, in which triangles are removed, millimetres; 0 for none.
+    pub cone_opening_mm: f64,
     /// The linkage.
     pub linkage: &'a Linkage,
     /// Where its points are in space, millimetres, by point.
@@ -160,10 +162,25 @@ fn warnings(out: &mut String, page: &Page<'_>) {
 
 fn stretch(out: &mut String, page: &Page<'_>, places: &[(usize, Point3<f64>)]) {
     let scale = ColourScale::scale_factor(page.sigma);
-    let values: Per<VertexId, f64> = page.layout.log_scale.iter().map(|x| x.exp()).collect();
+    // No number, and so no colour, where nothing is left of the sheet.
+    let value = |(x, distance): (&f64, &f64)| {
+        if *distance < page.cone_opening_mm {
+            f64::NAN
+        } else {
+            x.exp()
+        }
+    };
+    let around = page.layout.cone_distance_mm.iter();
+    let values: Per<VertexId, f64> = page
+        .layout
+        .log_scale
+        .iter()
+        .zip(around)
+        .map(value)
+        .collect();
     let _ = write!(
         out,
-        "<section><h2>Stretch</h2><p class=\"lead\">How much the sheet must open at each place: λ = 1 is closed, σ = {} is as far as the hinges of this material go.</p><div class=\"key\">{}</div>",
+        "<section><h2>Stretch</h2><p class=\"lead\">How much the sheet must open at each place: λ = 1 is closed, σ = {} is as far as the hinges of this material go. Around a cone whose triangles are removed it is grey.</p><div class=\"key\">{}</div>",
         short(page.sigma, 3),
         legend(
             &scale,

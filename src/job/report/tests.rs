@@ -78,6 +78,7 @@ fn with_page<T>(full: bool, then: impl FnOnce(&Page<'_>) -> T) -> T {
         warnings: &["σ is an <estimate>".into()],
         surface: &job.surface,
         layout: &job.layout,
+        cone_opening_mm: 0.0,
         linkage: &job.built.linkage,
         positions: &job.built.start,
         distances_in_l: &vec![0.01; job.built.start.len()],
