@@ -33,10 +33,14 @@ const CANDIDATES: usize = 240;
 const MOST_CONES: usize = 12;
 /// Cones closer than this to each other or to a rim, in triangle edges, are not proposed.
 const APART: f64 = 4.0;
+/// A cone is moved by so many times the distance between candidates at once.
+const MOVE: f64 = 4.0;
+/// Positive cones for which a negative one is looked for: those that do least harm alone.
+const PAIRED: usize = 6;
 /// Strongest cone.
 const MOST_UNITS: i32 = 2;
 /// Descents from a set with one cone torn out, in all.
-const TORN: usize = 12;
+const TORN: usize = 10;
 /// Sets that are mapped in full and polished.
 const POLISHED: usize = 2;
 /// Rounds of moving all cones over one distance.
@@ -89,6 +93,8 @@ pub fn search(
 struct Searcher {
     field: Field,
     apart_mm: f64,
+    /// How far a cone is moved at once: where it would have to go farther, tearing it out finds the place.
+    move_mm: f64,
     start: Vec<i32>,
     /// Whether rims may turn otherwise.
     free_rims: bool,
@@ -111,6 +117,7 @@ impl Searcher {
         let natural = || Singularities::natural_turnings(surface);
         Ok(Self {
             apart_mm: APART * options.edge_mm,
+            move_mm: MOVE * spacing(surface),
             start: options.turnings.clone().unwrap_or_else(natural),
             free_rims: options.turnings.is_none(),
             banned: vec![false; field.places.len()],
@@ -232,8 +239,10 @@ impl Searcher {
             if self.field.total.is_none() {
                 changes.push(Change::Remove { cone });
             }
+            let from = self.field.places[set.cones[cone].0].at;
             for place in 0..self.field.places.len() {
-                if place != set.cones[cone].0 && self.free(set, place, Some(cone)) {
+                let near = (self.field.places[place].at - from).norm() < self.move_mm;
+                if near && place != set.cones[cone].0 && self.free(set, place, Some(cone)) {
                     changes.push(Change::Move { cone, place });
                 }
             }
@@ -267,7 +276,7 @@ impl Searcher {
             .collect();
         alone.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut winner: Option<(f64, Set)> = None;
-        for &(_, place) in alone.iter().take(12) {
+        for &(_, place) in alone.iter().take(PAIRED) {
             progress.check()?;
             let half = best.changed(Change::Add { place, units: 1 });
             let mut pricer = Pricer::new(&self.field, &half);
@@ -281,6 +290,11 @@ impl Searcher {
         }
         Ok(winner)
     }
+}
+
+/// About how far candidates are from each other, millimetres.
+fn spacing(surface: &Surface) -> f64 {
+    (surface.area() / CANDIDATES as f64).sqrt()
 }
 
 /// Whether two sets are the same whatever the order of their cones.
@@ -315,10 +329,9 @@ fn polish(
         .extend(places.into_iter().zip(set.cones.iter().map(|c| c.units)));
     field.anchor(&best, &metric);
     let mut price = Pricer::new(&field, &best).price();
-    let spacing = (surface.area() / CANDIDATES as f64).sqrt();
     let mean =
         surface.edges().map(|h| surface.length(h)).sum::<f64>() / surface.edges().count() as f64;
-    let mut edges = ((0.5 * spacing / mean).round() as usize).clamp(1, 32);
+    let mut edges = ((0.5 * spacing(surface) / mean).round() as usize).clamp(1, 32);
     loop {
         for _ in 0..ROUNDS {
             let before = price;
