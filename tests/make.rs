@@ -54,9 +54,13 @@ fn make_and_judge(args: &[&str]) -> (sheet::Drawing, linkage::Findings) {
         "{args:?}: {}",
         stderr(&output)
     );
-    let out = folder.path().join("out");
-    for name in ALL {
-        assert!(out.join(name).is_file(), "{name}");
+    judge(&folder.path().join("out"), &format!("{args:?}"))
+}
+
+/// Lets both judges look at what was made.
+fn judge(out: &Path, name: &str) -> (sheet::Drawing, linkage::Findings) {
+    for file in ALL {
+        assert!(out.join(file).is_file(), "{name}: {file}");
     }
     let sigma = 2.0;
     let found = linkage::judge(
@@ -64,7 +68,7 @@ fn make_and_judge(args: &[&str]) -> (sheet::Drawing, linkage::Findings) {
         &read(out.join("layout.obj")),
         sigma,
     );
-    linkage::strict(&found).unwrap_or_else(|e| panic!("{args:?}: {e}"));
+    linkage::strict(&found).unwrap_or_else(|e| panic!("{name}: {e}"));
     let drawing = sheet::read_drawing(&read(out.join("pattern.svg")));
     let burnt = sheet::burn(&read(out.join("job.nc")));
     assert_eq!(burnt.faults, Vec::<String>::new());
@@ -155,12 +159,17 @@ fn surfaces_within_reach_become_jobs_at_full_size() {
         vec!["sample:torus:t=3.605551275463989"],
         vec!["sample:torus:t=3.0550504633038935"],
         vec!["sample:torus:t=4"],
+        vec!["sample:octasphere"],
+        vec!["sample:double_torus"],
     ] {
         let mut args = args;
+        // Where several seams must fit at once the lattice has few sizes to choose from: 1368 and 1373 triangles.
+        let several = ["sample:octasphere", "sample:double_torus"].contains(&args[0]);
+        let range = if several { 1350..=1650 } else { 1400..=1600 };
         args.extend(["--sigma", "2", "--triangles", "1500"]);
         let (_, found) = make_and_judge(&args);
         assert!(
-            (1400..=1600).contains(&found.triangles),
+            range.contains(&found.triangles),
             "{} triangles for 1500 wanted",
             found.triangles
         );
@@ -174,21 +183,35 @@ fn scans_become_jobs() {
     let Some(folder) = std::env::var_os("KAGOME_MODELS") else {
         return;
     };
-    let mask = Path::new(&folder).join("mp_mask_20k.obj");
-    if mask.is_file() {
-        let path = mask.to_string_lossy().into_owned();
-        let (_, found) = make_and_judge(&[
-            &path,
-            "--cone",
-            "auto",
-            "--remove",
-            "4",
-            "--triangles",
-            "1500",
+    for name in [
+        "mp_mask_20k",
+        "cat_head",
+        "mph_50k",
+        "boot_upper_annulus",
+        "torso_4loops",
+        "foot",
+        "bff_spothead",
+        "spot",
+        "nefertiti_mask",
+        "ict_face_A",
+        "ict_face_B",
+        "igl_3holes",
+    ] {
+        let scan = Path::new(&folder).join(format!("{name}.obj"));
+        if !scan.is_file() {
+            continue;
+        }
+        let path = scan.to_string_lossy();
+        let args = [
+            &*path,
+            "--size",
+            "250",
             "--sigma",
             "2",
-        ]);
-        assert!(found.distance < 0.1);
+            "--triangles",
+            "2500",
+        ];
+        make_and_judge(&args);
     }
 }
 
@@ -278,6 +301,79 @@ fn the_design_file_makes_the_same_bytes_again() {
     let changed = kagome(&["make", "a/design.toml", "-q", "-o", "d"], folder.path());
     assert_eq!(changed.status.code(), Some(2));
     assert!(stderr(&changed).contains("SHA-256"), "{}", stderr(&changed));
+}
+
+/// A dart opens the surface for the map only: what is written is the surface as it was. What a design decides about
+/// darts and left-out triangles makes the same sheet again.
+#[test]
+fn a_design_with_a_dart_and_left_out_triangles_makes_the_same_bytes_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let output = kagome(args, folder.path());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    };
+    let file = |out: &str, name: &str| read(folder.path().join(out).join(name));
+    let same = |a: &str, b: &str| {
+        for name in ALL {
+            assert!(file(a, name) == file(b, name), "{name} of {a} and {b}");
+        }
+    };
+    let vertices = |text: &str| text.lines().filter(|l| l.starts_with("v ")).count();
+    run(&["samples", "write", "cap:faces=2000", "-o", "cap.obj"]);
+    let cap = file("", "cap.obj");
+    let height = |place: &&[f64; 3]| place[2];
+    let places: Vec<[f64; 3]> = cap
+        .lines()
+        .filter_map(|l| l.strip_prefix("v "))
+        .map(|l| {
+            let numbers: Vec<f64> = l.split(' ').map(|n| n.parse().unwrap()).collect();
+            [numbers[0], numbers[1], numbers[2]]
+        })
+        .collect();
+    let by_height = |a: &&[f64; 3], b: &&[f64; 3]| height(a).total_cmp(&height(b));
+    let [top, rim] = [
+        places.iter().max_by(by_height).unwrap(),
+        places.iter().min_by(by_height).unwrap(),
+    ];
+    let dart = [top, rim].map(|[x, y, z]| format!("{x},{y},{z}")).join(";");
+    let sized = ["--triangles", "200", "--sigma", "2", "--dart", &dart];
+    run(&[&["make", "cap.obj", "-q", "-o", "darted"], &sized[..]].concat());
+    run(&["make", "darted/design.toml", "-q", "-o", "darted-again"]);
+    same("darted", "darted-again");
+    let design = file("darted", "design.toml");
+    assert_eq!(design.matches("[[dart]]").count(), 1, "{design}");
+    assert_eq!(vertices(&file("darted", "layout.obj")), vertices(&cap));
+    let (_, whole) = judge(&folder.path().join("darted"), "with a dart");
+    assert_eq!(
+        whole.seam_hinges, 0,
+        "the pattern does not go on across a dart"
+    );
+
+    // Two triangles fewer, by hand.
+    let fewer = design.replacen("[linkage]", "[linkage]\nleft_out = [60, 101]", 1);
+    std::fs::write(folder.path().join("darted/fewer.toml"), fewer).unwrap();
+    run(&["make", "darted/fewer.toml", "-q", "-o", "fewer"]);
+    run(&["make", "fewer/design.toml", "-q", "-o", "fewer-again"]);
+    same("fewer", "fewer-again");
+    let design = file("fewer", "design.toml");
+    assert!(design.contains("left_out = [60, 101]"), "{design}");
+    assert_eq!(design.matches("[[dart]]").count(), 1, "{design}");
+    let (_, found) = judge(&folder.path().join("fewer"), "with triangles left out");
+    assert_eq!(found.triangles, whole.triangles - 2);
+
+    // A design decides: a dart beside it is refused.
+    let beside = [
+        "make",
+        "darted/design.toml",
+        "-q",
+        "-o",
+        "no",
+        "--dart",
+        &dart,
+    ];
+    let output = kagome(&beside, folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("--dart"), "{}", stderr(&output));
 }
 
 #[test]
@@ -511,6 +607,31 @@ fn bad_input_costs_nothing() {
             &["two cones", "vertex 1"],
         ),
         (&["sample:bump", "--cone", "v1:3"], &["3 units"]),
+        (
+            &["sample:cap", "--dart", "1,2,3"],
+            &["1,2,3", "two or more"],
+        ),
+        (
+            &["sample:cap", "--dart", "v1;v9:1"],
+            &["v9:1", "two or more"],
+        ),
+        (
+            &["sample:cap", "--dart", "v1;v1"],
+            &["two different points"],
+        ),
+        (&["sample:cap", "--dart", "v1;v99999999"], &["v99999999"]),
+        (
+            &["sample:cap", "--dart", "0,0,115;5000,0,0"],
+            &["--dart 5000,0,0", "mm away"],
+        ),
+        (
+            &["sample:cap", "--dart", "100,0,57;0,0,115;-100,0,57"],
+            &["2 parts", "dart"],
+        ),
+        (
+            &["sample:cap", "--dart", "none", "--dart", "v1;v2"],
+            &["--dart none", "alone"],
+        ),
         (&["sample:cap", "-o", "no/such/place"], &["no/such/place"]),
         (&["sample:cap", "-o", "file"], &["file"]),
         (&["sample:cap", "-o", "file/out"], &["file/out"]),
