@@ -115,7 +115,7 @@ pub enum ConformalError {
     },
     /// The metric does not return to itself around a handle.
     #[error(
-        "around a handle the flat metric turns by {turn_deg:.3}°, which is no multiple of 120°, so the pattern cannot close there: move the cones, or cut the handle open"
+        "around a handle the flat metric turns by {turn_deg:.6}°, which is no multiple of 120°, so the pattern cannot close there: move the cones, or cut the handle open"
     )]
     Holonomy {
         /// The angle, degrees.
