@@ -524,6 +524,56 @@ fn flaps_are_of_the_sheet_only_and_can_be_left_out() {
     );
 }
 
+/// By points or by vertices, a cut stands in the design and leads the seam to the same place again.
+#[test]
+fn a_cut_is_kept_in_the_design() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let output = kagome(args, folder.path());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    };
+    let make = |cut: &str, out: &str| {
+        let vase = ["make", "sample:vase:faces=2000", "-q", "--sigma", "2"];
+        let rest = ["--triangles", "400", "--cut", cut, "-o", out];
+        run(&[&vase[..], &rest[..]].concat());
+    };
+    let file = |out: &str, name: &str| read(folder.path().join(out).join(name));
+    make("0,-58,0;0,-62,200", "points");
+    let design = file("points", "design.toml");
+    let lines = "[[cut]]\npoints_mm = [[0.0, -58.0, 0.0], [0.0, -62.0, 200.0]]";
+    assert!(design.contains(lines), "{design}");
+    make("0,58,0;0,62,200", "behind");
+    make("v3;v900;v20", "vertices");
+    let design = file("vertices", "design.toml");
+    assert!(
+        design.contains("[[cut]]\nvertices = [3, 900, 20]"),
+        "{design}"
+    );
+    for out in ["points", "vertices"] {
+        let again = format!("{out}-again");
+        run(&["make", &format!("{out}/design.toml"), "-q", "-o", &again]);
+        for name in ALL {
+            assert!(
+                file(out, name) == file(&again, name),
+                "{out}/{name} differs"
+            );
+        }
+        assert!(file(out, "linkage.obj") != file("behind", "linkage.obj"));
+    }
+    // A cut is a decision of the design.
+    let both = ["make", "points/design.toml", "--cut", "v1;v2", "-o", "both"];
+    let output = kagome(&both, folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("--cut"), "{}", stderr(&output));
+    let short = design.replace("[3, 900, 20]", "[3]");
+    std::fs::write(folder.path().join("short.toml"), short).unwrap();
+    let output = kagome(&["make", "short.toml", "-q", "-o", "both"], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    for word in ["cut[0]", "at least two"] {
+        assert!(stderr(&output).contains(word), "{}", stderr(&output));
+    }
+}
+
 /// Bad input: exit code 2, words that help, and nothing left behind.
 #[test]
 fn bad_input_costs_nothing() {
@@ -598,6 +648,20 @@ fn bad_input_costs_nothing() {
         ),
         (&["sample:bump", "--cone", "v99999999"], &["v99999999"]),
         (&["sample:bump", "--cone", "5000,0,0"], &["mm away"]),
+        (&["sample:bump", "--cut", "v1"], &["--cut", "v12;v905"]),
+        (&["sample:bump", "--cut", "auto"], &["--cut", "two or more"]),
+        (
+            &["sample:bump", "--cut", "v1;v99999999"],
+            &["--cut v99999999"],
+        ),
+        (
+            &["sample:vase", "--cut", "62,0,200;5000,0,0"],
+            &["--cut 5000,0,0", "mm away"],
+        ),
+        (
+            &["sample:vase", "--cut", "62,0,200;62,0,200.1"],
+            &["--cut", "farther apart"],
+        ),
         (
             &["sample:bump", "--cone", "none", "--cone", "v1"],
             &["--cone"],

@@ -64,6 +64,10 @@ pub struct MakeArgs {
     /// auto, none, or an open cut past two or more places, X,Y,Z;X,Y,Z or vN;vN; repeatable
     #[arg(long = "dart", value_name = "DART", allow_hyphen_values = true)]
     darts: Vec<DartArg>,
+    /// A path that the seam follows where it can, past two or more places, X,Y,Z;X,Y,Z or vN;vN; repeatable. A dart opens
+    /// the surface; a cut only says where the seam runs that the sheet needs anyway [default: where it shows least]
+    #[arg(long = "cut", value_name = "CUT", allow_hyphen_values = true)]
+    cuts: Vec<CutArg>,
     /// Triangles to drop at the cone: 4, 16, … [default: 4 at a positive cone, 16 where that fits better]
     #[arg(long, value_name = "N")]
     remove: Option<usize>,
@@ -170,19 +174,38 @@ impl std::str::FromStr for DartArg {
             "none" => return Ok(Self::None),
             _ => {}
         }
-        let places: Option<Vec<ConePlace>> = text
-            .split(';')
-            .map(|part| match part.trim().parse() {
-                Ok(ConeArg::At(place, _)) if !part.contains(':') => Some(place),
-                _ => None,
-            })
-            .collect();
-        match places {
-            Some(places) if places.len() > 1 => Ok(Self::Past(places)),
-            _ => Err(format!(
+        places(text).map(Self::Past).ok_or_else(|| {
+            format!(
                 "{text:?} is not auto, none, or two or more places, for example \"0,12.5,80;0,60,20\" or \"v12;v905\""
-            )),
-        }
+            )
+        })
+    }
+}
+
+/// Two or more places; none if the text is something else.
+fn places(text: &str) -> Option<Vec<ConePlace>> {
+    let places: Option<Vec<ConePlace>> = text
+        .split(';')
+        .map(|part| match part.trim().parse() {
+            Ok(ConeArg::At(place, _)) if !part.contains(':') => Some(place),
+            _ => None,
+        })
+        .collect();
+    places.filter(|places| places.len() > 1)
+}
+
+/// A value of `--cut`.
+#[derive(Clone, Debug, PartialEq)]
+struct CutArg(Vec<ConePlace>);
+
+impl std::str::FromStr for CutArg {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        places(text).map(Self).ok_or_else(|| {
+            format!(
+                "{text:?} is not two or more places, for example \"0,12.5,80;0,60,20\" or \"v12;v905\""
+            )
+        })
     }
 }
 
@@ -311,6 +334,7 @@ fn decided_by_design(args: &MakeArgs) -> Vec<&'static str> {
         (args.kerf.is_some(), "--kerf"),
         (!args.cones.is_empty(), "--cone"),
         (!args.darts.is_empty(), "--dart"),
+        (!args.cuts.is_empty(), "--cut"),
         (args.remove.is_some(), "--remove"),
         (matches!(args.leave_out, LeaveOutArg::None), "--leave-out"),
         (!args.turnings.is_empty(), "--turning"),
@@ -397,6 +421,7 @@ fn from_arguments(args: &MakeArgs) -> Result<Request, Failure> {
         },
         cones: cone_wish(&args.cones)?,
         darts: dart_wish(&args.darts)?,
+        cuts: args.cuts.iter().map(|c| c.0.clone()).collect(),
         left_out: match args.leave_out {
             LeaveOutArg::Auto => None,
             LeaveOutArg::None => Some(Vec::new()),

@@ -1,4 +1,4 @@
-//! Distances in the flat metric: how far every vertex is from the nearest cone.
+//! Distances in the flat metric, how far every vertex is from the nearest cone, and on the surface itself.
 //!
 //! Dijkstra's order with the update of triangles instead of edges (Kimmel and Sethian: Computing geodesic paths on
 //! manifolds, 1998): the distances of two corners place a source in the plane of their triangle, and the third corner's
@@ -10,15 +10,35 @@ use std::collections::BinaryHeap;
 
 use super::{Cone, Metric};
 use crate::base::ids::Per;
-use crate::mesh::{Surface, VertexId};
+use crate::mesh::{FaceId, HalfedgeId, Surface, VertexId};
 
 /// Distance of every vertex from the nearest cone in the metric's own unit; infinite without cones.
 pub(super) fn from_cones(surface: &Surface, metric: &Metric, cones: &[Cone]) -> Per<VertexId, f64> {
+    let starts = cones.iter().map(|cone| (cone.vertex, 0.0));
+    march(surface, |face| metric.lengths(surface, face), starts)
+}
+
+/// Distance of every vertex on the surface, millimetres, from vertices that are some way off themselves.
+pub(crate) fn from_vertices(
+    surface: &Surface,
+    starts: impl Iterator<Item = (VertexId, f64)>,
+) -> Per<VertexId, f64> {
+    let lengths = |face| [0, 1, 2].map(|k| surface.length(HalfedgeId::side(face, k)));
+    march(surface, lengths, starts)
+}
+
+fn march(
+    surface: &Surface,
+    lengths: impl Fn(FaceId) -> [f64; 3],
+    starts: impl Iterator<Item = (VertexId, f64)>,
+) -> Per<VertexId, f64> {
     let mut distance = Per::filled(surface.positions().len(), f64::INFINITY);
     let mut queue = BinaryHeap::new();
-    for cone in cones {
-        distance[cone.vertex] = 0.0;
-        queue.push(Reverse((0u64, cone.vertex)));
+    for (vertex, off) in starts {
+        if off < distance[vertex] {
+            distance[vertex] = off;
+            queue.push(Reverse((off.to_bits(), vertex)));
+        }
     }
     while let Some(Reverse((bits, here))) = queue.pop() {
         if f64::from_bits(bits) > distance[here] {
@@ -26,7 +46,7 @@ pub(super) fn from_cones(surface: &Surface, metric: &Metric, cones: &[Cone]) -> 
         }
         for h in surface.around(here) {
             let (face, k) = (h.face(), h.corner());
-            let lengths = metric.lengths(surface, face);
+            let lengths = lengths(face);
             let v = surface.faces()[face];
             let (left, right) = (v[(k + 2) % 3], v[(k + 1) % 3]);
             // Sides: k from here to right, k + 1 from right to left, k + 2 from left to here.

@@ -12,6 +12,7 @@ mod cut;
 mod dart;
 mod distance;
 mod field;
+mod geodesic;
 mod intrinsic;
 mod layout;
 mod linear;
@@ -24,6 +25,8 @@ mod system;
 pub use cone::{CURVATURE_UNIT, Cone, Singularities};
 pub use cut::{Segment, cut_graph};
 pub use dart::{Dart, Patch, around_handles, patches, slit_along, to_goals};
+pub(crate) use distance::from_vertices;
+pub(crate) use geodesic::{Stretch, straight_way};
 pub use layout::{Layout, ScaleSummary, Transition};
 pub use metric::{Metric, MetricSolver};
 pub use propose::{

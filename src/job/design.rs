@@ -39,6 +39,9 @@ pub struct Design {
     /// The darts; none if the list is absent.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub dart: Vec<DartChoice>,
+    /// Paths that the seam follows; none if the list is absent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cut: Vec<CutChoice>,
 }
 
 /// `[surface]`.
@@ -142,12 +145,48 @@ pub struct DartChoice {
     pub points_mm: Vec<[f64; 3]>,
 }
 
+/// `[[cut]]`: a path that the seam follows where it can, past vertices of the mesh or past points, joined by straight
+/// ways over it. Unlike a dart it opens nothing: the pattern goes on across it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CutChoice {
+    /// Vertices of the imported surface, counted from 1.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub vertices: Vec<u64>,
+    /// Points in millimetres; the nearest vertices of the surface are taken.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub points_mm: Vec<[f64; 3]>,
+}
+
 #[expect(
     clippy::trivially_copy_pass_by_ref,
     reason = "serde calls it with a reference"
 )]
 fn is_false(value: &bool) -> bool {
     !value
+}
+
+/// A path is given by vertices or by points, two or more.
+fn check_path(key: &str, vertices: &[u64], points_mm: &[[f64; 3]]) -> Result<(), Complaint> {
+    for value in points_mm.iter().flatten() {
+        ranged(&format!("{key}.points_mm"), *value, -1e6, 1e6)?;
+    }
+    let stops = vertices.len().max(points_mm.len());
+    if vertices.is_empty() == points_mm.is_empty() || stops < 2 {
+        return Err(Complaint::new(
+            key,
+            "needs either vertices or points_mm, at least two",
+        ));
+    }
+    Ok(())
+}
+
+/// The places that a path passes.
+fn path(vertices: &[u64], points_mm: &[[f64; 3]]) -> Vec<ConePlace> {
+    let by_number = vertices.iter().map(|&v| ConePlace::Vertex(v));
+    by_number
+        .chain(points_mm.iter().map(|&p| ConePlace::Point(p)))
+        .collect()
 }
 
 /// Rims as a person counts them, from 1, as ascending indices.
@@ -231,16 +270,10 @@ impl Design {
             100.0,
         )?;
         for (i, dart) in self.dart.iter().enumerate() {
-            for value in dart.points_mm.iter().flatten() {
-                ranged(&format!("dart[{i}].points_mm"), *value, -1e6, 1e6)?;
-            }
-            let stops = dart.vertices.len().max(dart.points_mm.len());
-            if dart.vertices.is_empty() == dart.points_mm.is_empty() || stops < 2 {
-                return Err(Complaint::new(
-                    format!("dart[{i}]"),
-                    "needs either vertices or points_mm, at least two",
-                ));
-            }
+            check_path(&format!("dart[{i}]"), &dart.vertices, &dart.points_mm)?;
+        }
+        for (i, cut) in self.cut.iter().enumerate() {
+            check_path(&format!("cut[{i}]"), &cut.vertices, &cut.points_mm)?;
         }
         for (i, cone) in self.cone.iter().enumerate() {
             for value in cone.at_mm.into_iter().flatten() {
@@ -286,16 +319,8 @@ impl Design {
                 (place, c.units)
             })
             .collect();
-        let darts = self
-            .dart
-            .iter()
-            .map(|d| {
-                let by_number = d.vertices.iter().map(|&v| ConePlace::Vertex(v));
-                by_number
-                    .chain(d.points_mm.iter().map(|&p| ConePlace::Point(p)))
-                    .collect()
-            })
-            .collect();
+        let darts = self.dart.iter().map(|d| path(&d.vertices, &d.points_mm));
+        let cuts = self.cut.iter().map(|c| path(&c.vertices, &c.points_mm));
         Request {
             source,
             import: ImportOptions {
@@ -318,7 +343,8 @@ impl Design {
             mirror: self.sheet.mirror,
             sizing: Sizing::EdgeMm(self.linkage.edge_mm),
             cones: ConeWish::Given(cones),
-            darts: DartWish::Given(darts),
+            darts: DartWish::Given(darts.collect()),
+            cuts: cuts.collect(),
             turnings: Some(
                 self.linkage
                     .rim_turnings_deg

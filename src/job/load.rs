@@ -1,13 +1,15 @@
-//! Reading what a request names: the surface, its hash, and cones and darts by vertices of it.
+//! Reading what a request names: the surface, its hash, and cones, darts and cuts by vertices of it.
 
 use nalgebra::Point3;
 use sha2::{Digest as _, Sha256};
 
 use super::MakeError;
-use super::design::{ConeChoice, DartChoice};
+use super::design::{ConeChoice, CutChoice, DartChoice};
 use super::request::{ConePlace, ConeWish, DartWish, Request, Source};
 use crate::conformal::{Cone, Dart, vertex_from_number};
-use crate::mesh::{ClosestPoint, Import, Sample, Surface, VertexId, import_bytes, insert_point};
+use crate::mesh::{
+    Closest, ClosestPoint, Import, Sample, Surface, VertexId, import_bytes, insert_point,
+};
 
 /// A surface with the decisions about it.
 pub(crate) struct Loaded {
@@ -23,6 +25,10 @@ pub(crate) struct Loaded {
     pub darts: Option<Vec<Dart>>,
     /// As they will stand in the design file; `None` while the program decides.
     pub dart_choices: Option<Vec<DartChoice>>,
+    /// Paths that the seam follows.
+    pub cuts: Vec<Vec<VertexId>>,
+    /// As they will stand in the design file.
+    pub cut_choices: Vec<CutChoice>,
 }
 
 /// Reads the surface, checks its hash, and turns the cones asked for into vertices.
@@ -84,23 +90,11 @@ pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
     if let DartWish::Given(wished) = &request.darts {
         let (mut list, mut choices) = (Vec::new(), Vec::new());
         for places in wished {
-            let mut stops = Vec::new();
-            let (mut vertices, mut points_mm) = (Vec::new(), Vec::new());
-            for &place in places {
-                stops.push(vertex_at("dart", place, &mut import.surface)?);
-                match place {
-                    ConePlace::Vertex(number) => vertices.push(number),
-                    ConePlace::Point(at) => points_mm.push(at),
-                }
-            }
-            // A design names one kind only.
-            if !vertices.is_empty() && !points_mm.is_empty() {
-                vertices.clear();
-                points_mm = stops
-                    .iter()
-                    .map(|&v| import.surface.position(v).into())
-                    .collect();
-            }
+            let stops = places
+                .iter()
+                .map(|&place| vertex_at("dart", place, &mut import.surface))
+                .collect::<Result<Vec<_>, _>>()?;
+            let (vertices, points_mm) = written(places, &stops, &import.surface);
             list.push(Dart { stops });
             choices.push(DartChoice {
                 vertices,
@@ -109,6 +103,26 @@ pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
         }
         (darts, dart_choices) = (Some(list), Some(choices));
     }
+    let (mut cuts, mut cut_choices) = (Vec::new(), Vec::new());
+    for places in &request.cuts {
+        let surface = &import.surface;
+        let stops = places
+            .iter()
+            .map(|&place| vertex_near("cut", place, surface))
+            .collect::<Result<Vec<_>, _>>()?;
+        if let Some(&vertex) = stops.first()
+            && stops.iter().all(|&v| v == vertex)
+        {
+            let at = surface.position(vertex).into();
+            return Err(MakeError::CutTooShort { vertex, at });
+        }
+        let (vertices, points_mm) = written(places, &stops, surface);
+        cuts.push(stops);
+        cut_choices.push(CutChoice {
+            vertices,
+            points_mm,
+        });
+    }
     Ok(Loaded {
         import,
         sha256,
@@ -116,7 +130,29 @@ pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
         cone_choices,
         darts,
         dart_choices,
+        cuts,
+        cut_choices,
     })
+}
+
+/// The places of a path as a design names them: all by their numbers or all as points.
+fn written(
+    places: &[ConePlace],
+    stops: &[VertexId],
+    surface: &Surface,
+) -> (Vec<u64>, Vec<[f64; 3]>) {
+    let (mut vertices, mut points_mm) = (Vec::new(), Vec::new());
+    for &place in places {
+        match place {
+            ConePlace::Vertex(number) => vertices.push(number),
+            ConePlace::Point(at) => points_mm.push(at),
+        }
+    }
+    if !vertices.is_empty() && !points_mm.is_empty() {
+        vertices.clear();
+        points_mm = stops.iter().map(|&v| surface.position(v).into()).collect();
+    }
+    (vertices, points_mm)
 }
 
 /// The vertex at a place, made one if it is none.
@@ -126,30 +162,56 @@ fn vertex_at(
     surface: &mut Surface,
 ) -> Result<VertexId, MakeError> {
     match place {
-        ConePlace::Vertex(number) => {
-            let count = surface.positions().len();
-            vertex_from_number(number)
-                .filter(|v| (v.0 as usize) < count)
-                .ok_or(MakeError::NoSuchVertex {
-                    what,
-                    vertex: number,
-                    count,
-                })
-        }
+        ConePlace::Vertex(number) => numbered(what, number, surface),
         ConePlace::Point(at) => {
-            let found = ClosestPoint::new(surface).query(Point3::from(at));
-            let (low, high) = surface.bounds();
-            if found.distance > 0.1 * (high - low).norm() {
-                return Err(MakeError::FarAway {
-                    what,
-                    at,
-                    distance_mm: found.distance,
-                });
-            }
+            let found = found_at(what, at, surface)?;
             let (changed, vertex) =
                 insert_point(surface, found.face, found.barycentric).map_err(MakeError::Edit)?;
             *surface = changed;
             Ok(vertex)
         }
     }
+}
+
+/// The vertex nearest to a place; the surface stays as it is.
+fn vertex_near(
+    what: &'static str,
+    place: ConePlace,
+    surface: &Surface,
+) -> Result<VertexId, MakeError> {
+    match place {
+        ConePlace::Vertex(number) => numbered(what, number, surface),
+        ConePlace::Point(at) => {
+            let found = found_at(what, at, surface)?;
+            let far = |k: usize| (surface.corners(found.face)[k] - found.point).norm();
+            let nearest = (1..3).fold(0, |best, k| if far(k) < far(best) { k } else { best });
+            Ok(surface.faces()[found.face][nearest])
+        }
+    }
+}
+
+/// The vertex with a number, counted from 1.
+fn numbered(what: &'static str, number: u64, surface: &Surface) -> Result<VertexId, MakeError> {
+    let count = surface.positions().len();
+    vertex_from_number(number)
+        .filter(|v| (v.0 as usize) < count)
+        .ok_or(MakeError::NoSuchVertex {
+            what,
+            vertex: number,
+            count,
+        })
+}
+
+/// The nearest point of the surface, unless it is far away.
+fn found_at(what: &'static str, at: [f64; 3], surface: &Surface) -> Result<Closest, MakeError> {
+    let found = ClosestPoint::new(surface).query(Point3::from(at));
+    let (low, high) = surface.bounds();
+    if found.distance > 0.1 * (high - low).norm() {
+        return Err(MakeError::FarAway {
+            what,
+            at,
+            distance_mm: found.distance,
+        });
+    }
+    Ok(found)
 }

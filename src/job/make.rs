@@ -241,6 +241,7 @@ fn decided(
             .dart_choices
             .clone()
             .unwrap_or_else(|| shape.ground.darts.iter().map(opened).collect()),
+        cut: loaded.cut_choices.clone(),
     }
 }
 

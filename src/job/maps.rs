@@ -10,6 +10,7 @@ use crate::conformal::{
     Cone, ConformalError, Dart, FlattenOptions, Flattened, MetricSolver, Wish, proposals,
     slit_along, with_cones,
 };
+use crate::linkage::SeamGuide;
 use crate::mesh::Surface;
 
 /// Triangles around a positive cone that are tried in turn unless a number is given: those at it, then those and the
@@ -23,6 +24,8 @@ pub(crate) struct Ground {
     pub surface: Surface,
     /// The darts, by vertices of the surface itself.
     pub darts: Vec<Dart>,
+    /// Where the seam is to run.
+    pub guide: SeamGuide,
 }
 
 impl Ground {
@@ -30,14 +33,22 @@ impl Ground {
     ///
     /// # Errors
     /// [`slit_along`].
-    pub fn new(surface: &Surface, darts: &[Dart]) -> Result<Self, ConformalError> {
+    pub fn new(
+        surface: &Surface,
+        darts: &[Dart],
+        guide: &SeamGuide,
+    ) -> Result<Self, ConformalError> {
         let darts = darts.to_vec();
         let surface = if darts.is_empty() {
             surface.clone()
         } else {
             slit_along(surface, &darts)?
         };
-        Ok(Self { surface, darts })
+        Ok(Self {
+            surface,
+            darts,
+            guide: guide.clone(),
+        })
     }
 }
 

@@ -19,7 +19,8 @@ mod verdict;
 use std::path::PathBuf;
 
 pub use design::{
-    ConeChoice, DartChoice, Design, LinkageChoice, SheetChoice, SolveChoice, SurfaceChoice,
+    ConeChoice, CutChoice, DartChoice, Design, LinkageChoice, SheetChoice, SolveChoice,
+    SurfaceChoice,
 };
 pub use make::{FILES, Made, make};
 pub use request::{
@@ -30,6 +31,7 @@ pub use verdict::{COVERAGE_WANTED, EDGE_TOLERANCE, Reason, Verdict};
 use crate::base::catalog::CatalogError;
 use crate::base::document::DocumentError;
 use crate::base::progress::Interrupted;
+use crate::mesh::VertexId;
 
 /// Why nothing was made.
 #[derive(Debug, thiserror::Error)]
@@ -84,28 +86,39 @@ pub enum MakeError {
         /// The largest value.
         most: f64,
     },
-    /// A cone at a vertex that does not exist.
+    /// A cone, a dart or a cut at a vertex that does not exist.
     #[error("--{what} v{vertex}: there is no such vertex, the surface has v1 to v{count}")]
     NoSuchVertex {
-        /// What was to be there: cone or dart.
+        /// What was to be there: cone, dart or cut.
         what: &'static str,
         /// As given.
         vertex: u64,
         /// Vertices there are.
         count: usize,
     },
-    /// A cone or a dart at a point far from the surface.
+    /// A cone, a dart or a cut at a point far from the surface.
     #[error(
         "--{what} {},{},{}: the surface is {distance_mm:.1} mm away from there; coordinates are millimetres after --unit, --scale and --size (see `kagome inspect`)",
         at[0], at[1], at[2]
     )]
     FarAway {
-        /// What was to be there: cone or dart.
+        /// What was to be there: cone, dart or cut.
         what: &'static str,
         /// As given.
         at: [f64; 3],
         /// Distance from the surface.
         distance_mm: f64,
+    },
+    /// A cut whose places are all at one vertex.
+    #[error(
+        "--cut: all its places are nearest to v{vertex} at {},{},{}: give two or more that are farther apart than the mesh's edges, as X,Y,Z;X,Y,Z",
+        at[0], at[1], at[2]
+    )]
+    CutTooShort {
+        /// The vertex.
+        vertex: VertexId,
+        /// Where it is, millimetres.
+        at: [f64; 3],
     },
     /// The mesh file is no surface.
     #[error(transparent)]

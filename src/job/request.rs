@@ -21,7 +21,7 @@ pub enum Source {
     Sample(String),
 }
 
-/// Where a cone is wanted, or a dart passes.
+/// Where a cone is wanted, or a dart or a cut passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ConePlace {
     /// At a vertex, counted from 1.
@@ -86,6 +86,9 @@ pub struct Request {
     pub cones: ConeWish,
     /// Darts.
     pub darts: DartWish,
+    /// Paths that the seam follows where it can, each by the places that it passes, joined by straight ways over the
+    /// surface.
+    pub cuts: Vec<Vec<ConePlace>>,
     /// Turning of each rim but the first in units of 120°; `None`: what needs least stretch.
     pub turnings: Option<Vec<i32>>,
     /// Rims (0-based, ascending) that become straight hems.
@@ -124,6 +127,7 @@ impl Request {
             sizing: Sizing::Triangles(DEFAULT_TRIANGLES),
             cones: ConeWish::Auto,
             darts: DartWish::Auto,
+            cuts: Vec::new(),
             turnings: None,
             straight: Vec::new(),
             orientation_deg: None,

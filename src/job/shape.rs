@@ -20,7 +20,7 @@ use crate::conformal::{
     ConformalError, Dart, FlattenOptions, Flattened, Layout, Sizing, around_handles, patches,
     to_goals,
 };
-use crate::linkage::{Built, Flaps, Linkage, LinkageOptions, build_without, fit};
+use crate::linkage::{Built, Flaps, Linkage, LinkageOptions, SeamGuide, build_without, fit};
 use crate::machine::Machine;
 use crate::mesh::{ClosestPoint, Surface};
 use crate::pattern::{self, PatternError, Sheet};
@@ -100,6 +100,9 @@ pub(crate) fn shape(
     progress: &dyn Progress,
 ) -> Result<Shape, MakeError> {
     let original = &loaded.import.surface;
+    let guide = SeamGuide::new(original)
+        .along(original, &loaded.cuts)
+        .map_err(MakeError::Conformal)?;
     let mut darts = loaded.darts.clone().unwrap_or_default();
     let mut free = loaded.darts.is_none()
         && request.cones == ConeWish::Auto
@@ -109,7 +112,7 @@ pub(crate) fn shape(
     // Darts that are no proposal to be taken back: those asked for, and those that open handles.
     let mut fixed = darts.len();
     loop {
-        let ground = Arc::new(Ground::new(original, &darts).map_err(MakeError::Conformal)?);
+        let ground = Arc::new(Ground::new(original, &darts, &guide).map_err(MakeError::Conformal)?);
         free &= darts.len() < fixed + MOST_DARTS;
         let found = match maps(
             request,
@@ -190,7 +193,7 @@ fn with_fewer_darts(
         let mut darts = best.ground.darts.clone();
         darts.remove(next);
         next += 1;
-        let Ok(ground) = Ground::new(original, &darts) else {
+        let Ok(ground) = Ground::new(original, &darts, &best.ground.guide) else {
             continue;
         };
         let Ok(found) = maps(request, None, &Arc::new(ground), stock.sigma, progress) else {
@@ -333,7 +336,8 @@ fn attempt(
         }
         progress.note(&format!("left out: {} triangles", left_out.len()));
         let surface = &map.ground.surface;
-        let mut built = build_without(surface, &flat.layout, &lattice, &left_out, progress)
+        let guide = &map.ground.guide;
+        let mut built = build_without(surface, &flat.layout, &lattice, &left_out, guide, progress)
             .map_err(MakeError::Linkage)?;
         let layout = &flat.layout;
         close_slots(&map, layout, &lattice, &mut built, &mut left_out, progress)?;
@@ -374,7 +378,8 @@ fn close_slots(
         }
         left_out.extend(later);
         left_out.sort_unstable();
-        *built = build_without(&map.ground.surface, layout, lattice, left_out, progress)
+        let (surface, guide) = (&map.ground.surface, &map.ground.guide);
+        *built = build_without(surface, layout, lattice, left_out, guide, progress)
             .map_err(MakeError::Linkage)?;
     }
     Ok(())
@@ -542,7 +547,8 @@ fn lay_out(
             remove_at_cone: map.removal,
             sigma,
         };
-        let built = build_without(surface, &fit.layout, &lattice, left_out, progress)
+        let guide = &map.ground.guide;
+        let built = build_without(surface, &fit.layout, &lattice, left_out, guide, progress)
             .map_err(MakeError::Linkage)?;
         flat.layout = fit.layout;
         Ok(Laid {

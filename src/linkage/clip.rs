@@ -35,6 +35,15 @@ pub(crate) struct Laid {
 /// rounding errors are 10⁻¹² of the layout's size.
 const TOLERANCE: f64 = 1e-9;
 
+/// Walks on a layout, as exact as its lattice of this edge needs.
+pub(super) fn walker<'a>(surface: &'a Surface, layout: &'a Layout, edge_mm: f64) -> Walker<'a> {
+    Walker {
+        surface,
+        layout,
+        tolerance_mm: (TOLERANCE * edge_mm).max(4.0 * layout.seam_gap_mm),
+    }
+}
+
 /// All lattice triangles with their three corners on the surface, with their neighbours, by face and key.
 pub(crate) fn lay(
     surface: &Surface,
@@ -43,11 +52,7 @@ pub(crate) fn lay(
     edge_mm: f64,
     progress: &dyn Progress,
 ) -> Result<Vec<Laid>, LinkageError> {
-    let walker = Walker {
-        surface,
-        layout,
-        tolerance_mm: (TOLERANCE * edge_mm).max(4.0 * layout.seam_gap_mm),
-    };
+    let walker = walker(surface, layout, edge_mm);
     let entries = centroids(&walker, lattice);
     let index: HashMap<(FaceId, Key), usize> =
         entries.iter().enumerate().map(|(n, e)| (*e, n)).collect();

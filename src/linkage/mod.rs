@@ -10,6 +10,7 @@
 mod clip;
 mod continuity;
 mod flaps;
+mod guide;
 mod lattice;
 mod lift;
 mod net;
@@ -26,6 +27,7 @@ pub use continuity::{Fitted, fit};
 #[cfg(test)]
 pub(crate) use flaps::tests::cylinder as cylinder_with_flaps;
 pub use flaps::{Flap, Flaps, SeamSegment};
+pub use guide::SeamGuide;
 pub use lattice::Lattice;
 pub use lift::opening_turn;
 pub use obj::write_obj;
@@ -136,11 +138,13 @@ pub fn build(
     options: &LinkageOptions,
     progress: &dyn Progress,
 ) -> Result<Built, LinkageError> {
-    build_without(surface, layout, options, &[], progress)
+    let guide = SeamGuide::new(surface);
+    build_without(surface, layout, options, &[], &guide, progress)
 }
 
 /// Builds the linkage of a layout without some triangles, by their [`Built::numbers`]: openings where the sheet cannot
-/// follow. Numbers that are none are passed over.
+/// follow. Numbers that are none are passed over. The seam runs where `guide` leads it, as far as the cones and rims that
+/// it must join leave it free.
 ///
 /// # Errors
 /// [`LinkageError`]: nothing fits, far too much fits, interruption.
@@ -149,6 +153,7 @@ pub fn build_without(
     layout: &Layout,
     options: &LinkageOptions,
     left_out: &[u32],
+    guide: &SeamGuide,
     progress: &dyn Progress,
 ) -> Result<Built, LinkageError> {
     let edge_mm = options.edge_mm;
@@ -181,7 +186,8 @@ pub fn build_without(
         return Err(nothing());
     }
     progress.check()?;
-    let flat = pieces::flatten(&kept, &lattice, middle(&kept), &|_, _| 1.0);
+    let prices = guide.prices(surface, layout, &kept, edge_mm);
+    let flat = pieces::flatten(&kept, &lattice, middle(&kept), &|t, side| prices[t][side]);
     let cells: Vec<Cell> = kept
         .iter()
         .zip(&flat.corners)
