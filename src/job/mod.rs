@@ -6,6 +6,7 @@
 
 mod cut;
 mod design;
+mod explore;
 mod load;
 mod make;
 mod maps;
@@ -21,6 +22,7 @@ use std::path::PathBuf;
 pub use design::{
     ConeChoice, DartChoice, Design, LinkageChoice, SheetChoice, SolveChoice, SurfaceChoice,
 };
+pub use explore::{ConeFigures, Explored, MapFigures, explore};
 pub use make::{FILES, Made, make};
 pub use request::{
     ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, FlapWish, Request, Source,
