@@ -9,6 +9,7 @@ mod design;
 mod explore;
 mod load;
 mod make;
+mod map_figures;
 mod maps;
 pub mod picture;
 pub mod report;
@@ -22,8 +23,9 @@ use std::path::PathBuf;
 pub use design::{
     ConeChoice, DartChoice, Design, LinkageChoice, SheetChoice, SolveChoice, SurfaceChoice,
 };
-pub use explore::{ConeFigures, Explored, MapFigures, explore};
+pub use explore::{Explored, explore};
 pub use make::{FILES, Made, make};
+pub use map_figures::{ConeFigures, MapFigures};
 pub use request::{
     ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, FlapWish, Request, Source,
 };
