@@ -1,9 +1,14 @@
 //! `kagome inspect`: what a surface is like, and what had to be mended.
 
+use std::path::PathBuf;
+
 use clap::Args;
 
+use super::flatten::{form_of, one_line, write};
+use super::layout_args::SizeArgs;
 use super::surface_args::SurfaceArgs;
 use super::{Failure, Global, Terminal, print};
+use crate::job::{MapFigures, Request, explore};
 use crate::mesh::Import;
 use crate::mesh::check::Inspection;
 
@@ -13,31 +18,89 @@ use crate::mesh::check::Inspection;
   kagome inspect scan.obj
   kagome inspect scan.stl --unit in
   kagome inspect statue.ply --size 300 --part largest --json
-  kagome inspect sample:torus:t=3")]
+  kagome inspect sample:torus:t=3
+  kagome inspect scan.obj --size 250 --propose")]
 pub struct InspectArgs {
     #[command(flatten)]
     surface: SurfaceArgs,
+    /// Also say what stretch it needs without cones, and which cones and turnings would need less
+    #[arg(long)]
+    propose: bool,
+    /// Write the best proposal: a page with pictures (.html), the surface with its layout (.obj), or a design for
+    /// `kagome make` (.toml)
+    #[arg(short, long, value_name = "FILE", requires = "propose")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    size: SizeArgs,
 }
 
 /// Reads a surface and prints its figures.
 ///
 /// # Errors
-/// [`Failure::Bad`] if it is no surface, with what is wrong and what to do.
-pub fn run(args: &InspectArgs, global: &Global, _terminal: &Terminal) -> Result<(), Failure> {
+/// [`Failure::Bad`] if it is no surface, or cannot be mapped, with what is wrong and what to do.
+pub fn run(args: &InspectArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
+    if !args.propose && !args.size.given().is_empty() {
+        return Err(Failure::Bad(format!(
+            "{} matters only with --propose",
+            args.size.given().join(", ")
+        )));
+    }
+    let form = args.output.as_deref().map(form_of).transpose()?;
     let import = args.surface.load()?;
     let found = Inspection::of(&import.surface);
+    let mut proposed = None;
+    if args.propose {
+        let request = Request {
+            import: args.surface.options(),
+            material: args.size.material.clone(),
+            sigma: args.size.sigma,
+            sizing: args.size.sizing(),
+            ..Request::new(args.surface.source())
+        };
+        let explored = explore(&request, true, terminal).map_err(Failure::bad)?;
+        if let (Some(path), Some(form)) = (&args.output, form) {
+            write(&explored, path, form, terminal)?;
+        }
+        proposed = Some(explored.figures());
+        terminal.clear();
+    }
     if global.json {
-        let result = serde_json::json!({
+        let mut result = serde_json::json!({
             "surface": args.surface.surface,
             "import": import.report,
             "repairs": import.report.repairs(),
             "kind": found.kind(),
             "figures": found,
         });
+        if let Some(maps) = proposed {
+            result["maps"] = serde_json::json!(maps);
+        }
         print(&format!("{result:#}"))
     } else {
-        print(&text(&args.surface.surface, &import, &found))
+        let mut all = text(&args.surface.surface, &import, &found);
+        if let Some(maps) = proposed {
+            all += &proposals(&maps);
+        }
+        print(&all)
     }
+}
+
+/// The stretch without cones, then the sets that were proposed, the most promising first, with the arguments that ask
+/// for them.
+fn proposals(maps: &[MapFigures]) -> String {
+    let mut lines = Vec::new();
+    let plain = maps.iter().find(|m| m.cones.is_empty());
+    lines.push(match plain {
+        Some(plain) => format!("Without cones: {}.", plain.answer()),
+        None => "There is no map without cones.".into(),
+    });
+    if maps.len() == 1 && plain.is_some_and(|p| p.suffices) {
+        lines.push("No cones are needed:".into());
+    } else {
+        lines.push("Maps, the most promising first, with the arguments for `kagome flatten` and `kagome make`:".into());
+    }
+    lines.extend(maps.iter().map(one_line));
+    lines.join("\n")
 }
 
 fn text(name: &str, import: &Import, found: &Inspection) -> String {

@@ -2,32 +2,26 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{ArgGroup, Args};
+use clap::Args;
 
+use super::layout_args::{CutArg, LayoutArgs, SizeArgs};
 use super::surface_args::SurfaceArgs;
 use super::{Failure, Global, Terminal, print, print_json};
 use crate::base::atomic::check_directory;
-use crate::conformal::Sizing;
-use crate::job::{
-    ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, Design, FILES, FlapWish,
-    Made, MakeError, Request, Source, make,
-};
+use crate::job::{ACCEPT_DISTANCE, Design, FILES, FlapWish, Made, MakeError, Request, make};
 use crate::linkage::Handedness;
 use crate::rationalize::Solver;
 
 /// Arguments of `kagome make`.
 #[derive(Args, Clone, Debug)]
-#[command(
-    group = ArgGroup::new("sizing").args(["edge", "triangles"]),
-    after_help = "Examples:
+#[command(after_help = "Examples:
   kagome make sample:mask
   kagome make scan.obj --size 220 --material plywood-3 --triangles 2000 -o scan-sheet
   kagome make scan.stl --cone v1200 --remove 16 --sigma 1.6
   kagome make scan-sheet/design.toml -o again
 
 SURFACE may be a mesh (OBJ, STL, PLY), sample:NAME (see `kagome samples list`), or a design.toml that an
-earlier run wrote; a design brings every decision with it, and only -o, --force and --accept-distance apply."
-)]
+earlier run wrote; a design brings every decision with it, and only -o, --force and --accept-distance apply.")]
 pub struct MakeArgs {
     #[command(flatten)]
     surface: SurfaceArgs,
@@ -37,51 +31,26 @@ pub struct MakeArgs {
     /// Replace the results of an earlier run
     #[arg(long)]
     force: bool,
-    /// Triangle edge in millimetres
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
-    edge: Option<f64>,
-    /// Number of triangles wanted, about [default: 1500]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    triangles: Option<f64>,
-    /// Material profile, by name (see `kagome materials list`) or file
-    #[arg(long, value_name = "NAME|FILE", default_value = crate::material::DEFAULT)]
-    material: String,
+    #[command(flatten)]
+    size: SizeArgs,
     /// Machine profile, by name (see `kagome machines list`) or file
     #[arg(long, value_name = "NAME|FILE", default_value = crate::machine::DEFAULT)]
     machine: String,
-    /// Largest stretch, in place of the material's: above 1, at most 2
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    sigma: Option<f64>,
     /// Width of the ligaments at the hinges, in place of the material's
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     hinge: Option<f64>,
     /// Width of the cut, in place of the material's
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     kerf: Option<f64>,
-    /// auto, none, a point X,Y,Z or a vertex vN; :K after it is its curvature in units of 120° (1 if absent)
-    #[arg(long = "cone", value_name = "CONE", allow_hyphen_values = true)]
-    cones: Vec<ConeArg>,
-    /// auto, none, or an open cut past two or more places, X,Y,Z;X,Y,Z or vN;vN; repeatable
-    #[arg(long = "dart", value_name = "DART", allow_hyphen_values = true)]
-    darts: Vec<DartArg>,
+    #[command(flatten)]
+    layout: LayoutArgs,
     /// A path that the seam follows where it can, past two or more places, X,Y,Z;X,Y,Z or vN;vN; repeatable. A dart opens
     /// the surface; a cut only says where the seam runs that the sheet needs anyway [default: where it shows least]
     #[arg(long = "cut", value_name = "CUT", allow_hyphen_values = true)]
     cuts: Vec<CutArg>,
-    /// Triangles to drop at the cone: 4, 16, … [default: 4 at a positive cone, 16 where that fits better]
-    #[arg(long, value_name = "N")]
-    remove: Option<usize>,
     /// auto leaves out the few triangles, if any, by which a sheet fails; none keeps all
     #[arg(long, value_enum, default_value_t = LeaveOutArg::Auto)]
     leave_out: LeaveOutArg,
-    /// How far a rim turns in degrees, a multiple of 120 (-360: a hole in a plane, 0: a tube's end); once for each rim
-    /// but the first, as `inspect` lists them [default: what needs least stretch]
-    #[arg(long = "turning", value_name = "DEG", allow_hyphen_values = true)]
-    turnings: Vec<i32>,
-    /// Make this rim a straight hem, by its number in `inspect`: the end of a tube then lies on one line of the sheet,
-    /// and the lattice follows it; repeatable
-    #[arg(long = "hem", value_name = "N")]
-    hems: Vec<u32>,
     /// Direction of the lattice in degrees; auto fits it to the seams, without seams along the sheet's X
     #[arg(
         long,
@@ -105,126 +74,6 @@ pub struct MakeArgs {
     /// Distance from the surface that is accepted, in triangle edges [default: 0.1]
     #[arg(long, value_name = "L", allow_negative_numbers = true)]
     accept_distance: Option<f64>,
-}
-
-/// A value of `--cone`.
-#[derive(Clone, Debug, PartialEq)]
-enum ConeArg {
-    Auto,
-    None,
-    At(ConePlace, i32),
-}
-
-impl std::str::FromStr for ConeArg {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        let form = || {
-            format!(
-                "{text:?} is not auto, none, X,Y,Z[:K] or vN[:K], for example 0,12.5,80 or v120:-1"
-            )
-        };
-        match text {
-            "auto" => return Ok(Self::Auto),
-            "none" => return Ok(Self::None),
-            _ => {}
-        }
-        let (place, units) = match text.split_once(':') {
-            Some((place, units)) => (
-                place,
-                units
-                    .trim_start_matches('+')
-                    .trim_start_matches('±')
-                    .parse()
-                    .map_err(|_| form())?,
-            ),
-            None => (text, 1),
-        };
-        if let Some(number) = place.strip_prefix('v') {
-            return Ok(Self::At(
-                ConePlace::Vertex(number.parse().map_err(|_| form())?),
-                units,
-            ));
-        }
-        let numbers: Vec<f64> = place
-            .split(',')
-            .map(|n| n.trim().parse::<f64>().map_err(|_| form()))
-            .collect::<Result<_, _>>()?;
-        match numbers[..] {
-            [x, y, z] if numbers.iter().all(|n| n.is_finite()) => {
-                Ok(Self::At(ConePlace::Point([x, y, z]), units))
-            }
-            _ => Err(form()),
-        }
-    }
-}
-
-/// A value of `--dart`.
-#[derive(Clone, Debug, PartialEq)]
-enum DartArg {
-    Auto,
-    None,
-    Past(Vec<ConePlace>),
-}
-
-impl std::str::FromStr for DartArg {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "auto" => return Ok(Self::Auto),
-            "none" => return Ok(Self::None),
-            _ => {}
-        }
-        places(text).map(Self::Past).ok_or_else(|| {
-            format!(
-                "{text:?} is not auto, none, or two or more places, for example \"0,12.5,80;0,60,20\" or \"v12;v905\""
-            )
-        })
-    }
-}
-
-/// Two or more places; none if the text is something else.
-fn places(text: &str) -> Option<Vec<ConePlace>> {
-    let places: Option<Vec<ConePlace>> = text
-        .split(';')
-        .map(|part| match part.trim().parse() {
-            Ok(ConeArg::At(place, _)) if !part.contains(':') => Some(place),
-            _ => None,
-        })
-        .collect();
-    places.filter(|places| places.len() > 1)
-}
-
-/// A value of `--cut`.
-#[derive(Clone, Debug, PartialEq)]
-struct CutArg(Vec<ConePlace>);
-
-impl std::str::FromStr for CutArg {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        places(text).map(Self).ok_or_else(|| {
-            format!(
-                "{text:?} is not two or more places, for example \"0,12.5,80;0,60,20\" or \"v12;v905\""
-            )
-        })
-    }
-}
-
-/// The darts that these arguments ask for.
-fn dart_wish(args: &[DartArg]) -> Result<DartWish, Failure> {
-    match args {
-        [] | [DartArg::Auto] => Ok(DartWish::Auto),
-        [DartArg::None] => Ok(DartWish::Given(Vec::new())),
-        many => many
-            .iter()
-            .map(|dart| match dart {
-                DartArg::Past(places) => Ok(places.clone()),
-                _ => Err(Failure::Bad(
-                    "--dart auto and --dart none stand alone".to_owned(),
-                )),
-            })
-            .collect::<Result<_, _>>()
-            .map(DartWish::Given),
-    }
 }
 
 /// A value of `--orientation`, degrees.
@@ -324,21 +173,12 @@ pub fn run(args: &MakeArgs, global: &Global, terminal: &Terminal) -> Result<(), 
 
 /// Options that a design file decides for itself.
 fn decided_by_design(args: &MakeArgs) -> Vec<&'static str> {
-    [
-        (args.edge.is_some(), "--edge"),
-        (args.triangles.is_some(), "--triangles"),
-        (args.material != crate::material::DEFAULT, "--material"),
+    let own = [
         (args.machine != crate::machine::DEFAULT, "--machine"),
-        (args.sigma.is_some(), "--sigma"),
         (args.hinge.is_some(), "--hinge"),
         (args.kerf.is_some(), "--kerf"),
-        (!args.cones.is_empty(), "--cone"),
-        (!args.darts.is_empty(), "--dart"),
         (!args.cuts.is_empty(), "--cut"),
-        (args.remove.is_some(), "--remove"),
         (matches!(args.leave_out, LeaveOutArg::None), "--leave-out"),
-        (!args.turnings.is_empty(), "--turning"),
-        (!args.hems.is_empty(), "--hem"),
         (args.orientation.0.is_some(), "--orientation"),
         (matches!(args.pattern, PatternArg::Left), "--pattern"),
         (args.mirror, "--mirror"),
@@ -349,8 +189,9 @@ fn decided_by_design(args: &MakeArgs) -> Vec<&'static str> {
         (args.surface.part.is_some(), "--part"),
     ]
     .into_iter()
-    .filter_map(|(given, name)| given.then_some(name))
-    .collect()
+    .filter_map(|(given, name)| given.then_some(name));
+    let shared = args.size.given().into_iter().chain(args.layout.given());
+    shared.chain(own).collect()
 }
 
 fn from_design(args: &MakeArgs) -> Result<Request, Failure> {
@@ -373,67 +214,32 @@ fn from_design(args: &MakeArgs) -> Result<Request, Failure> {
     Ok(request)
 }
 
-/// Turnings in units of 120°; `None` if the program is to choose.
-fn turning_wish(degrees: &[i32]) -> Result<Option<Vec<i32>>, Failure> {
-    if let Some(wrong) = degrees.iter().find(|deg| *deg % 120 != 0) {
-        return Err(Failure::Bad(format!(
-            "--turning {wrong}: a rim turns by a multiple of 120°, so that the pattern closes around it"
-        )));
-    }
-    let units = degrees.iter().map(|deg| deg / 120).collect();
-    Ok(Some(units).filter(|_| !degrees.is_empty()))
-}
-
-/// Straight rims, counted from 0.
-fn hem_wish(numbers: &[u32]) -> Result<Vec<usize>, Failure> {
-    if numbers.contains(&0) {
-        return Err(Failure::Bad(
-            "--hem 0: rims are counted from 1, see `kagome inspect`".into(),
-        ));
-    }
-    let mut hems: Vec<usize> = numbers.iter().map(|n| *n as usize - 1).collect();
-    hems.sort_unstable();
-    hems.dedup();
-    Ok(hems)
-}
-
 fn from_arguments(args: &MakeArgs) -> Result<Request, Failure> {
-    let name = &args.surface.surface;
-    let source = match name.strip_prefix("sample:") {
-        Some(sample) => Source::Sample(sample.to_owned()),
-        None => Source::File {
-            path: name.into(),
-            sha256: None,
-        },
-    };
     Ok(Request {
-        source,
+        source: args.surface.source(),
         import: args.surface.options(),
-        material: args.material.clone(),
+        material: args.size.material.clone(),
         machine: args.machine.clone(),
-        sigma: args.sigma,
+        sigma: args.size.sigma,
         hinge_width_mm: args.hinge,
         kerf_mm: args.kerf,
         mirror: args.mirror,
-        sizing: match (args.edge, args.triangles) {
-            (Some(edge), _) => Sizing::EdgeMm(edge),
-            (None, count) => Sizing::Triangles(count.unwrap_or(DEFAULT_TRIANGLES)),
-        },
-        cones: cone_wish(&args.cones)?,
-        darts: dart_wish(&args.darts)?,
+        sizing: args.size.sizing(),
+        cones: args.layout.cones()?,
+        darts: args.layout.darts()?,
         cuts: args.cuts.iter().map(|c| c.0.clone()).collect(),
         left_out: match args.leave_out {
             LeaveOutArg::Auto => None,
             LeaveOutArg::None => Some(Vec::new()),
         },
-        turnings: turning_wish(&args.turnings)?,
-        straight: hem_wish(&args.hems)?,
+        turnings: args.layout.turnings()?,
+        straight: args.layout.hems()?,
         orientation_deg: args.orientation.0,
         handedness: match args.pattern {
             PatternArg::Right => Handedness::Right,
             PatternArg::Left => Handedness::Left,
         },
-        remove_at_cone: args.remove,
+        remove_at_cone: args.layout.remove,
         flaps: match args.flaps {
             FlapsArg::Auto => FlapWish::Auto,
             FlapsArg::None => FlapWish::None,
@@ -444,23 +250,6 @@ fn from_arguments(args: &MakeArgs) -> Result<Request, Failure> {
         },
         accept_distance: args.accept_distance.unwrap_or(ACCEPT_DISTANCE),
     })
-}
-
-fn cone_wish(cones: &[ConeArg]) -> Result<ConeWish, Failure> {
-    match cones {
-        [] | [ConeArg::Auto] => Ok(ConeWish::Auto),
-        [ConeArg::None] => Ok(ConeWish::Given(Vec::new())),
-        given => given
-            .iter()
-            .map(|cone| match cone {
-                ConeArg::At(place, units) => Ok((*place, *units)),
-                _ => Err(Failure::Bad(
-                    "--cone auto and --cone none stand alone; leave out the other --cone".into(),
-                )),
-            })
-            .collect::<Result<_, _>>()
-            .map(ConeWish::Given),
-    }
 }
 
 /// Where the results go unless told: beside the caller, named after the surface.

@@ -3,7 +3,9 @@
 //! Exit codes: 0 done, 1 the answer is no, 2 bad usage or bad input. Results go to standard output (`--json` for
 //! machines), everything else to standard error.
 
+pub mod flatten;
 pub mod inspect;
+pub mod layout_args;
 pub mod machines;
 pub mod make;
 pub mod materials;
@@ -52,8 +54,10 @@ pub struct Global {
 enum Verb {
     /// From a surface to a verified, rehearsed job: the main thing
     Make(Box<make::MakeArgs>),
+    /// The conformal map alone: try cones, darts and rims before a sheet is made
+    Flatten(Box<flatten::FlattenArgs>),
     /// Show what a surface is like: topology, size, curvature, defects
-    Inspect(inspect::InspectArgs),
+    Inspect(Box<inspect::InspectArgs>),
     /// List the sample surfaces, or write one as a file
     Samples(samples::SamplesArgs),
     /// List, show and check machines
@@ -97,6 +101,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let global = &cli.global;
     let result = match &cli.verb {
         Verb::Make(args) => make::run(args, global, &terminal),
+        Verb::Flatten(args) => flatten::run(args, global, &terminal),
         Verb::Verify(args) => verify::run(args, global, &terminal),
         Verb::Inspect(args) => inspect::run(args, global, &terminal),
         Verb::Samples(args) => samples::run(args, global, &terminal),

@@ -3,6 +3,7 @@
 use clap::Args;
 
 use super::Failure;
+use crate::job::Source;
 use crate::mesh::repair::{Import, ImportOptions, PartChoice, import_file};
 use crate::mesh::samples::Sample;
 use crate::mesh::units::{Unit, Units};
@@ -51,6 +52,17 @@ impl SurfaceArgs {
             parts: match self.part {
                 Some(Part::Largest) => PartChoice::Largest,
                 None => PartChoice::Refuse,
+            },
+        }
+    }
+
+    /// What a request calls it.
+    pub fn source(&self) -> Source {
+        match self.surface.strip_prefix("sample:") {
+            Some(sample) => Source::Sample(sample.to_owned()),
+            None => Source::File {
+                path: (&self.surface).into(),
+                sha256: None,
             },
         }
     }

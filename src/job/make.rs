@@ -22,8 +22,10 @@ use super::verdict::{Reason, Verdict};
 use super::{MakeError, tell};
 use crate::base::atomic;
 use crate::base::progress::Progress;
-use crate::conformal::{Cone, Dart, Sizing};
+use crate::conformal::{Cone, Dart, Flattened, Sizing};
 use crate::linkage::write_obj;
+use crate::machine::Machine;
+use crate::material::{CutSetting, Material};
 use crate::mesh::{ClosestPoint, PartChoice, write};
 use crate::pattern;
 use crate::rationalize::{Quality, hinge_scales};
@@ -78,14 +80,7 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     let material = crate::material::load(&request.material).map_err(MakeError::Material)?;
     let machine = crate::machine::load(&request.machine).map_err(MakeError::Machine)?;
     let setting = material.cut_for(&machine).map_err(MakeError::Cut)?;
-    let stock = Stock {
-        sigma: checked_sigma(request.sigma.unwrap_or(material.sigma.max))?,
-        hinge_width_mm: request.hinge_width_mm.unwrap_or(material.hinge_width_mm),
-        kerf_mm: request.kerf_mm.unwrap_or(setting.kerf_mm),
-        machine: &machine,
-    };
-    check_sizing(request.sizing)?;
-    check_ranges(request.accept_distance, &stock)?;
+    let stock = stock(request, &material, &machine, &setting)?;
 
     progress.start("reading the surface", None);
     let loaded = load(request)?;
@@ -107,7 +102,14 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     }
 
     progress.start("report", None);
-    let design = decided(request, folder, &loaded, &shape, &stock);
+    let taken = Taken {
+        flat: &shape.flat,
+        darts: &shape.ground.darts,
+        removed: shape.removed,
+        left_out: &shape.left_out,
+        orientation_deg: shape.orientation_deg,
+    };
+    let design = decided(request, folder, &loaded, &taken, &stock);
     let figures = tell::figures(&design, &loaded, &shape, job.as_ref(), &warnings);
     let summary = tell::summary(&material, &machine, &shape, job.as_ref(), stock.sigma);
     let drawing = shape
@@ -181,12 +183,39 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     })
 }
 
+/// What the sheet is to be, asked for or as the profiles say.
+pub(crate) fn stock<'a>(
+    request: &Request,
+    material: &Material,
+    machine: &'a Machine,
+    setting: &CutSetting,
+) -> Result<Stock<'a>, MakeError> {
+    let stock = Stock {
+        sigma: checked_sigma(request.sigma.unwrap_or(material.sigma.max))?,
+        hinge_width_mm: request.hinge_width_mm.unwrap_or(material.hinge_width_mm),
+        kerf_mm: request.kerf_mm.unwrap_or(setting.kerf_mm),
+        machine,
+    };
+    check_sizing(request.sizing)?;
+    check_ranges(request.accept_distance, &stock)?;
+    Ok(stock)
+}
+
+/// What was decided about the shape of a sheet.
+pub(crate) struct Taken<'a> {
+    pub flat: &'a Flattened,
+    pub darts: &'a [Dart],
+    pub removed: usize,
+    pub left_out: &'a [u32],
+    pub orientation_deg: f64,
+}
+
 /// Every decision, asked for or taken.
-fn decided(
+pub(crate) fn decided(
     request: &Request,
     folder: &Path,
     loaded: &Loaded,
-    shape: &Shape,
+    shape: &Taken<'_>,
     stock: &Stock<'_>,
 ) -> Design {
     let (file, sample) = match &request.source {
@@ -224,7 +253,7 @@ fn decided(
             orientation_deg: shape.orientation_deg,
             pattern: request.handedness,
             remove_at_cone: shape.removed,
-            left_out: shape.left_out.clone(),
+            left_out: shape.left_out.to_vec(),
             rim_turnings_deg: shape.flat.singularities.rim_turnings_deg(),
             flaps: request.flaps,
             straight_rims: shape.flat.singularities.straight_rims(),
@@ -240,12 +269,12 @@ fn decided(
         dart: loaded
             .dart_choices
             .clone()
-            .unwrap_or_else(|| shape.ground.darts.iter().map(opened).collect()),
+            .unwrap_or_else(|| shape.darts.iter().map(opened).collect()),
         cut: loaded.cut_choices.clone(),
     }
 }
 
-fn checked_sigma(sigma: f64) -> Result<f64, MakeError> {
+pub(crate) fn checked_sigma(sigma: f64) -> Result<f64, MakeError> {
     if sigma > 1.0 && sigma <= 2.0 {
         Ok(sigma)
     } else {
@@ -276,7 +305,7 @@ fn check_ranges(accept_distance: f64, stock: &Stock<'_>) -> Result<(), MakeError
     Ok(())
 }
 
-fn check_sizing(sizing: Sizing) -> Result<(), MakeError> {
+pub(crate) fn check_sizing(sizing: Sizing) -> Result<(), MakeError> {
     match sizing {
         Sizing::EdgeMm(edge) if !(edge.is_finite() && edge > 0.0) => Err(MakeError::Size {
             what: "the triangle edge (--edge)",
@@ -292,7 +321,7 @@ fn check_sizing(sizing: Sizing) -> Result<(), MakeError> {
     }
 }
 
-fn title(source: &Source) -> String {
+pub(crate) fn title(source: &Source) -> String {
     match source {
         Source::Sample(text) => text.trim_start_matches("sample:").to_owned(),
         Source::File { path, .. } => path

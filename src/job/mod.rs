@@ -6,8 +6,10 @@
 
 mod cut;
 mod design;
+mod explore;
 mod load;
 mod make;
+mod map_figures;
 mod maps;
 pub mod picture;
 pub mod report;
@@ -22,7 +24,9 @@ pub use design::{
     ConeChoice, CutChoice, DartChoice, Design, LinkageChoice, SheetChoice, SolveChoice,
     SurfaceChoice,
 };
+pub use explore::{Explored, explore};
 pub use make::{FILES, Made, make};
+pub use map_figures::{ConeFigures, MapFigures};
 pub use request::{
     ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, FlapWish, Request, Source,
 };

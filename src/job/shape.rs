@@ -480,12 +480,12 @@ fn solve(
 }
 
 /// A lattice laid on a map.
-struct Laid {
+pub(crate) struct Laid {
     /// The map, warped so that the lattice goes on across its seams.
-    flat: Flattened,
+    pub flat: Flattened,
     built: Built,
     lattice: LinkageOptions,
-    orientation_deg: f64,
+    pub orientation_deg: f64,
     distortion: f64,
 }
 
@@ -501,7 +501,7 @@ impl Shape {
 }
 
 /// Lays the lattice. With a number of triangles asked for, the edge is corrected once for those that the rim costs.
-fn lay_out(
+pub(crate) fn lay_out(
     request: &Request,
     map: &Map,
     left_out: &[u32],

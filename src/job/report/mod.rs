@@ -6,6 +6,7 @@
 //! data: it measures nothing and decides nothing.
 
 mod histogram;
+mod map;
 mod strokes;
 mod table;
 mod text;
@@ -16,6 +17,7 @@ use std::fmt::Write as _;
 use nalgebra::Point3;
 
 pub use histogram::histogram;
+pub use map::{MapPage, map_html};
 pub use strokes::{Role, Stroke};
 pub use text::{escape, svg_element};
 
@@ -76,14 +78,9 @@ const SHADE_REACH: f64 = 0.45;
 /// The page as text. Lists that are shorter than the linkage asks for leave out or grey what they do not tell.
 pub fn html(page: &Page<'_>) -> String {
     let mut out = String::with_capacity(2 << 20);
-    let _ = write!(
-        out,
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{0} · kagome</title><style>{1}</style></head>\n<body><main><h1>{0}</h1>\n",
-        escape(page.title),
-        include_str!("style.css")
-    );
+    head(&mut out, page.title);
     verdict(&mut out, page);
-    summary(&mut out, page);
+    summary(&mut out, page.summary);
     warnings(&mut out, page);
     let places: Vec<(usize, Point3<f64>)> = page
         .verdict
@@ -92,17 +89,36 @@ pub fn html(page: &Page<'_>) -> String {
         .enumerate()
         .filter_map(|(i, r)| r.at_mm.map(|p| (i + 1, Point3::from(p))))
         .collect();
-    stretch(&mut out, page, &places);
+    let map = Stretch {
+        surface: page.surface,
+        layout: page.layout,
+        cone_opening_mm: page.cone_opening_mm,
+        sigma: page.sigma,
+    };
+    stretch(&mut out, &map, &places);
     linkage(&mut out, page, &places);
     hinges(&mut out, page);
     sheet(&mut out, page);
     toolpath(&mut out, page);
+    foot(&mut out, page.figures);
+    out
+}
+
+fn head(out: &mut String, title: &str) {
+    let _ = write!(
+        out,
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{0} · kagome</title><style>{1}</style></head>\n<body><main><h1>{0}</h1>\n",
+        escape(title),
+        include_str!("style.css")
+    );
+}
+
+fn foot(out: &mut String, figures: &serde_json::Value) {
     let _ = write!(
         out,
         "<section><h2>All figures</h2>{}</section>\n</main></body></html>\n",
-        table::table(page.figures)
+        table::table(figures)
     );
-    out
 }
 
 fn verdict(out: &mut String, page: &Page<'_>) {
@@ -133,12 +149,12 @@ fn verdict(out: &mut String, page: &Page<'_>) {
     out.push_str("</section>");
 }
 
-fn summary(out: &mut String, page: &Page<'_>) {
-    if page.summary.is_empty() {
+fn summary(out: &mut String, lines: &[(String, String)]) {
+    if lines.is_empty() {
         return;
     }
     out.push_str("<dl class=\"summary\">");
-    for (name, value) in page.summary {
+    for (name, value) in lines {
         let _ = write!(
             out,
             "<div><dt>{}</dt><dd>{}</dd></div>",
@@ -160,28 +176,32 @@ fn warnings(out: &mut String, page: &Page<'_>) {
     out.push_str("</ul></section>");
 }
 
-fn stretch(out: &mut String, page: &Page<'_>, places: &[(usize, Point3<f64>)]) {
-    let scale = ColourScale::scale_factor(page.sigma);
+/// What the pictures of λ are drawn from.
+#[derive(Clone, Copy)]
+struct Stretch<'a> {
+    surface: &'a Surface,
+    layout: &'a Layout,
+    cone_opening_mm: f64,
+    sigma: f64,
+}
+
+fn stretch(out: &mut String, map: &Stretch<'_>, places: &[(usize, Point3<f64>)]) {
+    let (surface, layout) = (map.surface, map.layout);
+    let scale = ColourScale::scale_factor(map.sigma);
     // No number, and so no colour, where nothing is left of the sheet.
     let value = |(x, distance): (&f64, &f64)| {
-        if *distance < page.cone_opening_mm {
+        if *distance < map.cone_opening_mm {
             f64::NAN
         } else {
             x.exp()
         }
     };
-    let around = page.layout.cone_distance_mm.iter();
-    let values: Per<VertexId, f64> = page
-        .layout
-        .log_scale
-        .iter()
-        .zip(around)
-        .map(value)
-        .collect();
+    let around = layout.cone_distance_mm.iter();
+    let values: Per<VertexId, f64> = layout.log_scale.iter().zip(around).map(value).collect();
     let _ = write!(
         out,
         "<section><h2>Stretch</h2><p class=\"lead\">How much the sheet must open at each place: λ = 1 is closed, σ = {} is as far as the hinges of this material go. Around a cone whose triangles are removed it is grey.</p><div class=\"key\">{}</div>",
-        short(page.sigma, 3),
+        short(map.sigma, 3),
         legend(
             &scale,
             "",
@@ -193,7 +213,7 @@ fn stretch(out: &mut String, page: &Page<'_>, places: &[(usize, Point3<f64>)]) {
         name: "on the flat layout",
         view: View::flat(),
     }];
-    let scene = Scene::layout(page.surface, page.layout, &values, &scale);
+    let scene = Scene::layout(surface, layout, &values, &scale);
     out.push_str(&views::figures(
         &scene,
         "stretch on the layout",
@@ -204,14 +224,14 @@ fn stretch(out: &mut String, page: &Page<'_>, places: &[(usize, Point3<f64>)]) {
         },
         &[],
     ));
-    let scene = Scene::surface(page.surface, &values, &scale);
+    let scene = Scene::surface(surface, &values, &scale);
     let _ = write!(
         out,
         "<div class=\"grid\" style=\"margin-top:12px\">{}</div></section>",
         views::figures(
             &scene,
             "stretch on the surface",
-            &views::around(View::front(page.surface)),
+            &views::around(View::front(surface)),
             Style {
                 size: VIEW_SIZE,
                 shade_mm: 0.0,
