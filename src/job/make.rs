@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::Point2;
 use serde_json::Value;
 
+use super::choose::choose;
 use super::cut::{CutResult, cut};
 use super::design::{
     ConeChoice, DartChoice, Design, FORMAT, LinkageChoice, SheetChoice, SolveChoice, SurfaceChoice,
@@ -17,7 +18,7 @@ use super::load::{Loaded, load};
 use super::maps::clearance;
 use super::report::{self, Page, Stroke};
 use super::request::{Request, Source};
-use super::shape::{Shape, Stock, shape};
+use super::shape::{Shape, Stock};
 use super::verdict::{Reason, Verdict};
 use super::{MakeError, tell};
 use crate::base::atomic;
@@ -86,7 +87,7 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     let loaded = load(request)?;
     let surface = &loaded.import.surface;
     let closest = ClosestPoint::new(surface);
-    let mut shape = shape(request, &loaded, &stock, &closest, progress)?;
+    let mut shape = choose(request, &loaded, &stock, &closest, progress)?;
     let warnings = tell::warnings(&loaded, &material, &shape, stock.sigma);
 
     // Only a sheet that passes is turned into anything that a machine could run.

@@ -4,6 +4,7 @@
 //! decided, so that the same sheet can be made again. A [`Verdict`] says whether it may be cut; only then is there a
 //! pattern or a job.
 
+mod choose;
 mod cut;
 mod design;
 mod explore;

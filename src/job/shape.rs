@@ -1,8 +1,7 @@
-//! From a request to a judged linkage with its flat sheet in place on the bed.
+//! From a map to a judged linkage with its flat sheet in place on the bed.
 //!
-//! Cheap steps first: map, linkage and sheet show whether the request can work at all before the long solve. The maps
-//! come from [`maps`], the most promising first; where cones are left to the program and none of them is within reach,
-//! the surface is opened by a dart where it is worst, and mapped again.
+//! Cheap steps first: linkage and sheet show whether the request can work at all before the long solve. Where a linkage
+//! fails by a few triangles only, it is made once more without them.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -10,17 +9,13 @@ use std::sync::Arc;
 use nalgebra::{Point2, Point3};
 
 use super::MakeError;
-use super::load::Loaded;
-use super::maps::{Ground, Map, maps};
+use super::maps::{Ground, Map};
 use super::request::{ConeWish, FlapWish, Request};
 use super::verdict::{Verdict, place};
 use crate::base::progress::Progress;
 use crate::base::units::short;
-use crate::conformal::{
-    ConformalError, Dart, FlattenOptions, Flattened, Layout, Sizing, around_handles, patches,
-    to_goals,
-};
-use crate::linkage::{Built, Flaps, Linkage, LinkageOptions, SeamGuide, build_without, fit};
+use crate::conformal::{FlattenOptions, Flattened, Layout, Sizing};
+use crate::linkage::{Built, Flaps, Linkage, LinkageOptions, build_without, fit};
 use crate::machine::Machine;
 use crate::mesh::{ClosestPoint, Surface};
 use crate::pattern::{self, PatternError, Sheet};
@@ -74,16 +69,6 @@ pub(crate) struct Shape {
     pub verdict: Verdict,
 }
 
-/// Linkages tried on one surface before it gets another dart, and in all once there is nothing more to open.
-const TRIED: usize = 4;
-/// Darts at the most that the program opens by itself, beside those that open handles.
-const MOST_DARTS: usize = 8;
-/// Maps tried without a dart that is to be taken back.
-const RETRIED: usize = 2;
-/// While there are darts to try, a map is laid out only if its misfit is smaller, in L: the sheet then misses the
-/// surface by about a third of that.
-const PROMISING: f64 = 0.7;
-
 /// Where a linkage fails by a few triangles only, it is made again without them, so often at the most.
 const MENDED: usize = 4;
 /// Rounds of closing slots.
@@ -91,214 +76,9 @@ const MOST_SLOTS: usize = 8;
 /// Part of all triangles that may be left out like this.
 const MOST_LEFT_OUT: f64 = 0.015;
 
-/// Finds the shape: the first map that passes, with as few darts as possible, else the one that comes closest.
-pub(crate) fn shape(
-    request: &Request,
-    loaded: &Loaded,
-    stock: &Stock<'_>,
-    closest: &ClosestPoint,
-    progress: &dyn Progress,
-) -> Result<Shape, MakeError> {
-    let original = &loaded.import.surface;
-    let guide = SeamGuide::new(original)
-        .along(original, &loaded.cuts)
-        .map_err(MakeError::Conformal)?;
-    let mut darts = loaded.darts.clone().unwrap_or_default();
-    let mut free = loaded.darts.is_none()
-        && request.cones == ConeWish::Auto
-        && request.turnings.is_none()
-        && request.straight.is_empty();
-    let mut tries = Tries::default();
-    // Darts that are no proposal to be taken back: those asked for, and those that open handles.
-    let mut fixed = darts.len();
-    loop {
-        let ground = Arc::new(Ground::new(original, &darts, &guide).map_err(MakeError::Conformal)?);
-        free &= darts.len() < fixed + MOST_DARTS;
-        let found = match maps(
-            request,
-            loaded.cones.as_deref(),
-            &ground,
-            stock.sigma,
-            progress,
-        ) {
-            Err(MakeError::Conformal(
-                error @ (ConformalError::Holonomy { .. } | ConformalError::TotalCurvature { .. }),
-            )) if free && ground.surface.genus() > 0 => {
-                // The pattern does not close around the handles.
-                darts.extend(around_handles(original).map_err(MakeError::Conformal)?);
-                fixed = darts.len();
-                progress.note(&format!("the handles are cut open: {error}"));
-                continue;
-            }
-            // A dart may leave a surface that cannot be mapped; what was found before it still counts.
-            Err(MakeError::Conformal(error)) if darts.len() > fixed && progress.check().is_ok() => {
-                tries.refused.get_or_insert(MakeError::Conformal(error));
-                break;
-            }
-            found => found?,
-        };
-        let next = match found.first() {
-            Some(map) if free => dart_for(original, map, stock.sigma)?,
-            _ => None,
-        };
-        for map in found {
-            let promising = map.flat.scale.misfit_mm < PROMISING * map.flat.edge_mm;
-            if tries.on(&ground) >= TRIED || next.is_some() && !promising {
-                tries.waiting.push(map);
-            } else if let Some(shape) = tries.attempt(request, map, stock, closest, progress)? {
-                return with_fewer_darts(request, original, shape, fixed, stock, closest, progress);
-            }
-        }
-        let Some(dart) = next else { break };
-        let at = original.position(dart.stops[0]);
-        progress.note(&format!(
-            "no cones suffice: a dart is opened at {}",
-            place(at)
-        ));
-        darts.push(dart);
-    }
-    // Nothing passed. The most promising of what was left for later, for the best answer to give.
-    let mut waiting = std::mem::take(&mut tries.waiting);
-    waiting.sort_by(|a, b| a.misfit().total_cmp(&b.misfit()));
-    for map in waiting {
-        if tries.count >= TRIED {
-            break;
-        }
-        if let Some(shape) = tries.attempt(request, map, stock, closest, progress)? {
-            return with_fewer_darts(request, original, shape, fixed, stock, closest, progress);
-        }
-    }
-    let nothing = || MakeError::Internal("no layout was tried".into());
-    tries
-        .best
-        .ok_or_else(|| tries.refused.unwrap_or_else(nothing))
-}
-
-/// Takes back the darts after the first `fixed`, one by one, that the shape passes without: what an early dart was for,
-/// later ones may have taken over.
-fn with_fewer_darts(
-    request: &Request,
-    original: &Surface,
-    shape: Shape,
-    fixed: usize,
-    stock: &Stock<'_>,
-    closest: &ClosestPoint,
-    progress: &dyn Progress,
-) -> Result<Shape, MakeError> {
-    let mut best = shape;
-    let mut next = fixed;
-    // The last one was needed: it passed with it, and not without.
-    while next + 1 < best.ground.darts.len() {
-        progress.check().map_err(MakeError::Interrupted)?;
-        let mut darts = best.ground.darts.clone();
-        darts.remove(next);
-        next += 1;
-        let Ok(ground) = Ground::new(original, &darts, &best.ground.guide) else {
-            continue;
-        };
-        let Ok(found) = maps(request, None, &Arc::new(ground), stock.sigma, progress) else {
-            continue;
-        };
-        let mut tries = Tries::default();
-        for map in found.into_iter().take(RETRIED) {
-            if map.misfit() > PROMISING {
-                break;
-            }
-            if let Some(shape) = tries.attempt(request, map, stock, closest, progress)? {
-                progress.note("one dart less will do");
-                best = shape;
-                next -= 1;
-                break;
-            }
-        }
-    }
-    Ok(best)
-}
-
-/// The dart that takes up what a map misses most: from where λ is farthest outside to the nearest opening, on a surface
-/// without one to the next such place.
-fn dart_for(original: &Surface, map: &Map, sigma: f64) -> Result<Option<Dart>, MakeError> {
-    let surface = &map.ground.surface;
-    let exclude_mm = map.options.cone_clearance * map.flat.edge_mm;
-    let patches = patches(surface, &map.flat.layout, exclude_mm, sigma);
-    let count = original.positions().len();
-    let known = |v: &crate::mesh::VertexId| (v.0 as usize) < count;
-    let mut peaks = patches.iter().map(|p| p.peak).filter(known);
-    let Some(from) = peaks.next() else {
-        return Ok(None);
-    };
-    let closed = surface.rims().is_empty();
-    let goals: Vec<_> = if closed {
-        peaks.take(1).collect()
-    } else {
-        Vec::new()
-    };
-    to_goals(original, &map.ground.darts, from, &goals).map_err(MakeError::Conformal)
-}
-
-/// What was tried so far.
-#[derive(Default)]
-struct Tries {
-    count: usize,
-    /// Tried on the surface of that many darts.
-    here: (usize, usize),
-    waiting: Vec<Map>,
-    best: Option<Shape>,
-    refused: Option<MakeError>,
-}
-
-impl Tries {
-    /// How many were tried on this surface.
-    fn on(&mut self, ground: &Ground) -> usize {
-        if self.here.0 != ground.darts.len() {
-            self.here = (ground.darts.len(), 0);
-        }
-        self.here.1
-    }
-
-    /// Tries a map; the shape if it passes.
-    fn attempt(
-        &mut self,
-        request: &Request,
-        map: Map,
-        stock: &Stock<'_>,
-        closest: &ClosestPoint,
-        progress: &dyn Progress,
-    ) -> Result<Option<Shape>, MakeError> {
-        self.here.1 += 1;
-        let shape = match attempt(request, map, stock, closest, progress) {
-            Ok(shape) => shape,
-            // A map may ask for triangles that are too small for the hinges, or for too many, where another does not.
-            Err(error @ (MakeError::Pattern(_) | MakeError::Linkage(_)))
-                if progress.check().is_ok() =>
-            {
-                self.refused.get_or_insert(error);
-                return Ok(None);
-            }
-            Err(error) => return Err(error),
-        };
-        self.count += 1;
-        if !shape.verdict.pass {
-            progress.note(&format!(
-                "tried: the sheet misses the surface by {} L",
-                short(shape.quality.distance_max.value, 2)
-            ));
-        }
-        if shape.verdict.pass {
-            return Ok(Some(shape));
-        }
-        let nearer =
-            |old: &Shape| shape.quality.distance_max.value < old.quality.distance_max.value;
-        if self.best.as_ref().is_none_or(nearer) {
-            self.best = Some(shape);
-        }
-        Ok(None)
-    }
-}
-
 /// Lays a linkage on a map, solves and judges it; where it fails by a few triangles only, it is made once more without
 /// them.
-fn attempt(
+pub(crate) fn attempt(
     request: &Request,
     map: Map,
     stock: &Stock<'_>,
