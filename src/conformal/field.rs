@@ -237,7 +237,7 @@ impl Field {
 pub(super) struct Pricer<'f> {
     field: &'f Field,
     set: &'f Set,
-    /// u of the set, without the cone that is being moved.
+    /// u of the set.
     u: Vec<f64>,
     /// Weights, 0 where a cone hides the sample.
     weight: Vec<f64>,
@@ -282,10 +282,7 @@ impl<'f> Pricer<'f> {
     /// The price of the set itself.
     pub fn price(&mut self) -> f64 {
         let toll = self.field.toll(self.set);
-        let weight = std::mem::take(&mut self.trial_weight);
-        let mut weight = weight;
-        weight.copy_from_slice(&self.weight);
-        self.trial_weight = weight;
+        self.trial_weight.copy_from_slice(&self.weight);
         for (x, u) in self.trial.iter_mut().zip(&self.u) {
             *x = -u;
         }

@@ -3,9 +3,8 @@
 //! The slit sheet stretches the same in every direction, so a shape that it can take is a conformal image of the flat
 //! sheet with a scale factor λ between 1 (closed) and σ (open); see the paper, §3.1. Room by room: [`MetricSolver`]
 //! finds the scaled edge lengths (CETM) for given [`Singularities`], [`cut_graph`] opens the surface to a disk,
-//! [`Layout`] unfolds the faces and carries λ, a [`Dart`] leaves
-//! open what no cone can help, [`flatten()`] does all of it, decides on the singularities where they
-//! are left open, and scales.
+//! [`Layout`] unfolds the faces and carries λ, [`search()`] proposes singularities where they are left open, a [`Dart`]
+//! opens the surface where no cone can help, and [`flatten()`] does all of it but the darts, and scales.
 
 mod cone;
 mod cut;
