@@ -141,11 +141,16 @@ fn with_fewer_darts(
             if map.misfit() > PROMISING {
                 break;
             }
-            if let Some(shape) = tries.attempt(request, map, stock, closest, progress)? {
-                progress.note("one dart less will do");
-                best = shape;
-                next -= 1;
-                break;
+            // What goes wrong here does not cost the shape that passes already.
+            match tries.attempt(request, map, stock, closest, progress) {
+                Ok(Some(shape)) => {
+                    progress.note("one dart less will do");
+                    best = shape;
+                    next -= 1;
+                    break;
+                }
+                Err(error @ MakeError::Interrupted(_)) => return Err(error),
+                _ => {}
             }
         }
     }
