@@ -208,8 +208,25 @@ impl Field {
     }
 
     pub fn toll(&self, set: &Set) -> f64 {
-        let each = |c: &(usize, i32)| if c.1 == 1 { TOLL } else { TOLL_DEAR };
-        set.cones.iter().map(each).sum()
+        set.cones.iter().map(|c| toll_of(c.1)).sum()
+    }
+
+    /// The toll of a set after a change, without making that set.
+    fn toll_after(&self, set: &Set, change: Change) -> f64 {
+        let left = set
+            .cones
+            .iter()
+            .enumerate()
+            .map(|(i, &(at, units))| match change {
+                Change::Remove { cone } if cone == i => 0,
+                Change::Add { place, units: more } if place == at => units + more,
+                _ => units,
+            });
+        let new = match change {
+            Change::Add { place, units } if set.cones.iter().all(|c| c.0 != place) => units,
+            _ => 0,
+        };
+        left.chain(std::iter::once(new)).map(toll_of).sum()
     }
 
     /// What the cheapest change is worth at the least.
@@ -230,6 +247,15 @@ impl Field {
             add(rim, turning);
         }
         u
+    }
+}
+
+/// The toll of one cone; none of no cone.
+fn toll_of(units: i32) -> f64 {
+    match units {
+        0 => 0.0,
+        1 => TOLL,
+        _ => TOLL_DEAR,
     }
 }
 
@@ -291,7 +317,7 @@ impl<'f> Pricer<'f> {
 
     /// The price of the set after a change; the caller sees to it that cones stay apart.
     pub fn after(&mut self, change: Change) -> f64 {
-        let toll = self.field.toll(&self.set.changed(change));
+        let toll = self.field.toll_after(self.set, change);
         let field = self.field;
         match change {
             Change::Add { place, units } => {

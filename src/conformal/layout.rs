@@ -215,6 +215,18 @@ impl Layout {
         self.corners.iter().map(doubled_area).sum::<f64>() * 0.5
     }
 
+    /// Width and height of the box around the chart, millimetres.
+    pub fn extent_mm(&self) -> [f64; 2] {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for p in self.corners.iter().flatten() {
+            for k in 0..2 {
+                low[k] = low[k].min(p[k]);
+                high[k] = high[k].max(p[k]);
+            }
+        }
+        [high[0] - low[0], high[1] - low[1]]
+    }
+
     /// λ at a point of a face, given by its barycentric coordinates: ln λ is interpolated linearly.
     #[inline]
     pub fn scale_at(&self, surface: &Surface, face: FaceId, barycentric: [f64; 3]) -> f64 {

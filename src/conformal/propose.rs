@@ -78,10 +78,7 @@ pub fn flatten(
         ConeRequest::Given(given) => Flattened::solve(&mut solver, given, options, progress),
         ConeRequest::Auto => {
             let found = proposals(&mut solver, &Wish::default(), options, progress)?;
-            let least = |a: &Flattened, b: &Flattened| {
-                let misfit = |f: &Flattened| f.scale.misfit_mm / f.edge_mm;
-                misfit(a).total_cmp(&misfit(b))
-            };
+            let least = |a: &Flattened, b: &Flattened| a.misfit().total_cmp(&b.misfit());
             match found.into_iter().min_by(least) {
                 Some(best) => Ok(best),
                 None => {
@@ -293,6 +290,11 @@ impl Flattened {
             self.singularities,
             options,
         )
+    }
+
+    /// What the map asks for beyond the sheet, in triangle edges; 0 where σ suffices. See [`ScaleSummary::misfit_mm`].
+    pub fn misfit(&self) -> f64 {
+        self.scale.misfit_mm / self.edge_mm
     }
 
     /// What may do better where this map without cones leaves [1, σ]: a cone at the vertex of largest λ.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::MakeError;
 use super::load::Loaded;
 use super::maps::{Ground, Map, maps};
-use super::request::{ConeWish, Request};
+use super::request::Request;
 use super::shape::{Shape, Stock, attempt};
 use super::verdict::place;
 use crate::base::progress::Progress;
@@ -41,10 +41,7 @@ pub(crate) fn choose(
         .along(original, &loaded.cuts)
         .map_err(MakeError::Conformal)?;
     let mut darts = loaded.darts.clone().unwrap_or_default();
-    let mut free = loaded.darts.is_none()
-        && request.cones == ConeWish::Auto
-        && request.turnings.is_none()
-        && request.straight.is_empty();
+    let mut free = request.darts_are_free();
     let mut tries = Tries::default();
     // Darts that are no proposal to be taken back: those asked for, and those that open handles.
     let mut fixed = darts.len();
@@ -79,7 +76,7 @@ pub(crate) fn choose(
             _ => None,
         };
         for map in found {
-            let promising = map.flat.scale.misfit_mm < PROMISING * map.flat.edge_mm;
+            let promising = map.misfit() < PROMISING;
             if tries.on(&ground) >= TRIED || next.is_some() && !promising {
                 tries.waiting.push(map);
             } else if let Some(shape) = tries.attempt(request, map, stock, closest, progress)? {
@@ -220,15 +217,13 @@ impl Tries {
             Err(error) => return Err(error),
         };
         self.count += 1;
-        if !shape.verdict.pass {
-            progress.note(&format!(
-                "tried: the sheet misses the surface by {} L",
-                short(shape.quality.distance_max.value, 2)
-            ));
-        }
         if shape.verdict.pass {
             return Ok(Some(shape));
         }
+        progress.note(&format!(
+            "tried: the sheet misses the surface by {} L",
+            short(shape.quality.distance_max.value, 2)
+        ));
         let nearer =
             |old: &Shape| shape.quality.distance_max.value < old.quality.distance_max.value;
         if self.best.as_ref().is_none_or(nearer) {

@@ -13,7 +13,7 @@ use super::design::Design;
 use super::load::{Loaded, load};
 use super::make::{Taken, check_sizing, checked_sigma, decided, stock, title};
 use super::map_figures::{ConeFigures, MapFigures};
-use super::maps::{Ground, Map, clearance, maps};
+use super::maps::{Ground, Map, cone_opening_mm, maps};
 use super::report::{MapPage, map_html};
 use super::request::Request;
 use super::shape::lay_out;
@@ -47,10 +47,7 @@ pub fn explore(
     let loaded = load(request)?;
     let surface = &loaded.import.surface;
     // As `make` does: handles around which the pattern cannot close are opened where that is left to the program.
-    let free = loaded.darts.is_none()
-        && loaded.cones.is_none()
-        && request.turnings.is_none()
-        && request.straight.is_empty();
+    let free = request.darts_are_free();
     let mut darts = loaded.darts.clone().unwrap_or_default();
     // No sheet is cut here, so that it is all one where a seam would run.
     let guide = SeamGuide::new(surface);
@@ -126,10 +123,7 @@ impl Explored {
             summary: &figures.summary(),
             surface: &map.ground.surface,
             layout: &map.flat.layout,
-            cone_opening_mm: match map.removal {
-                0 => 0.0,
-                removed => clearance(removed) * map.flat.edge_mm,
-            },
+            cone_opening_mm: cone_opening_mm(map.removal, map.flat.edge_mm),
             sigma: self.sigma,
             largest_at: map.ground.surface.position(largest),
             figures: &value,
@@ -189,13 +183,6 @@ impl Explored {
         let set = &flat.singularities;
         let first = (!surface.rims().is_empty()).then(|| 120 * set.rest(surface));
         let inner = set.rim_turnings_deg().into_iter().map(i64::from);
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for corner in flat.layout.corners.iter().flatten() {
-            for k in 0..2 {
-                low[k] = low[k].min(corner[k]);
-                high[k] = high[k].max(corner[k]);
-            }
-        }
         let area = flat.layout.area_mm2();
         let mut distortion = flat.layout.quasi_conformal_error(surface).into_vec();
         distortion.sort_by(f64::total_cmp);
@@ -233,7 +220,7 @@ impl Explored {
             lambda_max_at_mm: at(scale.max_vertex),
             area_inside_sigma: scale.inside,
             misfit_in_l: map.misfit(),
-            layout_mm: [high[0] - low[0], high[1] - low[1]],
+            layout_mm: flat.layout.extent_mm(),
             layout_area_mm2: area,
             edge_mm: flat.edge_mm,
             triangles: area / (0.75f64.sqrt() * 0.5 * flat.edge_mm * flat.edge_mm),

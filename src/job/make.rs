@@ -15,7 +15,7 @@ use super::design::{
     ConeChoice, DartChoice, Design, FORMAT, LinkageChoice, SheetChoice, SolveChoice, SurfaceChoice,
 };
 use super::load::{Loaded, load};
-use super::maps::clearance;
+use super::maps::cone_opening_mm;
 use super::report::{self, Page, Stroke};
 use super::request::{Request, Source};
 use super::shape::{Shape, Stock};
@@ -132,10 +132,7 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         warnings: &warnings,
         surface: &shape.ground.surface,
         layout: &shape.flat.layout,
-        cone_opening_mm: match shape.removed {
-            0 => 0.0,
-            removed => clearance(removed) * edge_mm,
-        },
+        cone_opening_mm: cone_opening_mm(shape.removed, edge_mm),
         linkage: &shape.linkage,
         positions: &shape.positions,
         distances_in_l: &distances,

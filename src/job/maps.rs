@@ -63,7 +63,7 @@ pub(crate) struct Map {
 impl Map {
     /// What the map asks for beyond the sheet, in L; 0 where σ suffices.
     pub fn misfit(&self) -> f64 {
-        self.flat.scale.misfit_mm / self.flat.edge_mm
+        self.flat.misfit()
     }
 }
 
@@ -122,10 +122,18 @@ pub(crate) fn maps(
     Ok(maps)
 }
 
+/// Radius around each cone, on the sheet, in which `removal` triangles leave it open, millimetres; 0 for none.
+pub(crate) fn cone_opening_mm(removal: usize, edge_mm: f64) -> f64 {
+    match removal {
+        0 => 0.0,
+        removed => clearance(removed) * edge_mm,
+    }
+}
+
 /// Radius around a cone, in L, that no triangle's centre comes within: 1/√3 with all triangles in place, 2/√3 without
 /// the four at the cone, 2 rings without sixteen; taken a little smaller for the second and third because corners
 /// reach further in than centres.
-pub(crate) fn clearance(removal: usize) -> f64 {
+fn clearance(removal: usize) -> f64 {
     if removal == 0 {
         0.7
     } else {

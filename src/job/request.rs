@@ -113,6 +113,14 @@ pub struct Request {
 pub const ACCEPT_DISTANCE: f64 = 0.1;
 
 impl Request {
+    /// Whether the program may open the surface by darts of its own: only where it chooses cones and turnings too.
+    pub fn darts_are_free(&self) -> bool {
+        self.darts == DartWish::Auto
+            && self.cones == ConeWish::Auto
+            && self.turnings.is_none()
+            && self.straight.is_empty()
+    }
+
     /// A request with every decision left to the program but the surface.
     pub fn new(source: Source) -> Self {
         Self {

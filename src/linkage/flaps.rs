@@ -511,10 +511,10 @@ impl<'a> Planner<'a> {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::clip::{Laid, core};
+    use super::super::clip::Laid;
     use super::super::pieces::lay;
     use super::super::pieces::tests::{
-        cone, double_torus, octahedron, parallelogram, saddle_between_cones,
+        cone, double_torus, octahedron, parallelogram, saddle_between_cones, with_holes,
     };
     use super::super::{Colour, Handedness};
     use super::*;
@@ -776,17 +776,7 @@ pub(super) mod tests {
         fn rows_of_anything_with_holes_are_in_nobodys_way(
             which in 0usize..6, holes in prop::collection::vec(any::<u32>(), 0..60),
         ) {
-            let laid = match which {
-                0 => octahedron(5),
-                1 => parallelogram(9, 8, 3, [true, true]),
-                2 => cone(8, 6, 0),
-                3 => saddle_between_cones(4),
-                4 => cone(2, 9, 1),
-                _ => double_torus(6),
-            };
-            let mut keep = vec![true; laid.len()];
-            holes.iter().for_each(|h| keep[*h as usize % laid.len()] = false);
-            let left = core(&laid, |t| keep[t]).0;
+            let left = with_holes(which, &holes);
             if !left.is_empty() {
                 checked(&left);
             }

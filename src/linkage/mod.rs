@@ -157,7 +157,7 @@ pub fn build_without(
     progress: &dyn Progress,
 ) -> Result<Built, LinkageError> {
     let edge_mm = options.edge_mm;
-    let (area, (width_mm, height_mm)) = (layout.area_mm2(), extent(layout));
+    let (area, [width_mm, height_mm]) = (layout.area_mm2(), layout.extent_mm());
     let triangle_area = 0.5 * lattice::HEIGHT * edge_mm * edge_mm;
     let nothing = || LinkageError::NothingFits {
         edge_mm,
@@ -245,18 +245,6 @@ fn slots(kept: &[clip::Laid], flat: &[[Point2<f64>; 3]], edge_mm: f64) -> Vec<(u
         }
     }
     found
-}
-
-/// Width and height of a layout, millimetres.
-fn extent(layout: &Layout) -> (f64, f64) {
-    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for p in layout.corners.iter().flatten() {
-        for k in 0..2 {
-            low[k] = low[k].min(p[k]);
-            high[k] = high[k].max(p[k]);
-        }
-    }
-    (high[0] - low[0], high[1] - low[1])
 }
 
 /// The triangle nearest to the mean centroid: most of the sheet then lies as it does on the layout.

@@ -885,23 +885,30 @@ pub(super) mod tests {
         assert_eq!(core(&laid, |t| !gone[t]).0.len(), cone(4, 6, 2).len());
     }
 
+    /// One of six surfaces without some of its triangles.
+    pub(in crate::linkage) fn with_holes(which: usize, holes: &[u32]) -> Vec<Laid> {
+        let laid = match which {
+            0 => octahedron(5),
+            1 => parallelogram(9, 8, 3, [true, true]),
+            2 => cone(8, 6, 0),
+            3 => saddle_between_cones(4),
+            4 => cone(2, 9, 1),
+            _ => double_torus(6),
+        };
+        let mut keep = vec![true; laid.len()];
+        holes
+            .iter()
+            .for_each(|h| keep[*h as usize % laid.len()] = false);
+        core(&laid, |t| keep[t]).0
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
 
         /// Whatever is missing from whatever surface: it lies flat.
         #[test]
         fn anything_with_holes_lies_flat(which in 0usize..6, holes in prop::collection::vec(any::<u32>(), 0..60)) {
-            let laid = match which {
-                0 => octahedron(5),
-                1 => parallelogram(9, 8, 3, [true, true]),
-                2 => cone(8, 6, 0),
-                3 => saddle_between_cones(4),
-                4 => cone(2, 9, 1),
-                _ => double_torus(6),
-            };
-            let mut keep = vec![true; laid.len()];
-            holes.iter().for_each(|h| keep[*h as usize % laid.len()] = false);
-            let left = core(&laid, |t| keep[t]).0;
+            let left = with_holes(which, &holes);
             if !left.is_empty() {
                 checked(&left);
             }
