@@ -48,19 +48,28 @@ impl Pattern {
     pub fn expanded(&self, block: usize) -> Self {
         let size = self.size();
         let (ptr, rows) = (self.symbolic.col_ptr(), self.symbolic.row_idx());
-        let pairs = (0..size).flat_map(move |col| {
-            rows[ptr[col] as usize..ptr[col + 1] as usize]
-                .iter()
-                .flat_map(move |&row| {
-                    (0..block * block).map(move |k| {
-                        (
-                            row * block as u32 + (k / block) as u32,
-                            (col * block) as u32 + (k % block) as u32,
-                        )
-                    })
-                })
-        });
-        Self::new(size * block, pairs)
+        let mut col_ptr = Vec::with_capacity(size * block + 1);
+        let mut expanded = Vec::with_capacity(rows.len() * block * block);
+        col_ptr.push(0);
+        for col in 0..size {
+            for c in 0..block {
+                for &row in &rows[ptr[col] as usize..ptr[col + 1] as usize] {
+                    // Of the block on the diagonal only the lower triangle is stored.
+                    let above = if row as usize == col { c } else { 0 };
+                    expanded.extend((above..block).map(|r| row * block as u32 + r as u32));
+                }
+                col_ptr.push(expanded.len() as u32);
+            }
+        }
+        Self {
+            symbolic: SymbolicSparseColMat::new_checked(
+                size * block,
+                size * block,
+                col_ptr,
+                None,
+                expanded,
+            ),
+        }
     }
 
     /// Rows (= columns) of the matrix.

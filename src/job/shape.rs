@@ -19,7 +19,7 @@ use crate::linkage::{Built, Flaps, Linkage, LinkageOptions, build_without, fit};
 use crate::machine::Machine;
 use crate::mesh::{ClosestPoint, Surface};
 use crate::pattern::{self, PatternError, Sheet};
-use crate::rationalize::{Effort, Quality, failing, rationalize};
+use crate::rationalize::{Effort, Quality, STAGE_COUNT, failing, rationalize};
 
 /// What the sheet is to be, whatever its shape.
 pub(crate) struct Stock<'a> {
@@ -220,7 +220,7 @@ fn solve(
         .for_each(|t| t.flat = t.flat.map(moved));
     let chart = flat.layout.corners.iter().map(|c| c.map(moved)).collect();
 
-    progress.start("rationalising", Some(5));
+    progress.start("rationalising", Some(STAGE_COUNT));
     let (positions, effort) = rationalize(
         &linkage,
         &built.start,

@@ -12,20 +12,20 @@ mod quality;
 
 use nalgebra::{Point3, Vector3};
 
-pub use exact::Effort;
+pub use exact::{Effort, STAGE_COUNT};
 pub use problem::Problem;
 pub use quality::{OVERLAP_TOLERANCE, Quality, SIGMA_TOLERANCE, Worst, failing};
 
 use crate::base::progress::{Interrupted, Progress};
 use crate::base::sparse::FactorError;
-use crate::linkage::Linkage;
+use crate::linkage::{Linkage, PointId};
 use crate::mesh::ClosestPoint;
 
 /// Which solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Solver {
-    /// Levenberg–Marquardt on all conditions.
+    /// Newton steps on all conditions at once.
     #[default]
     Exact,
     /// The paper's alternating projection.
@@ -58,11 +58,33 @@ pub fn rationalize(
 ) -> Result<(Vec<Point3<f64>>, Effort), RationalizeError> {
     let problem = Problem::new(linkage, sigma);
     match solver {
-        Solver::Exact => exact::solve(&problem, start, closest, linkage.edge_mm, progress),
+        Solver::Exact => {
+            let target = exact::Target::Surface(closest);
+            exact::solve(&problem, start, target, &[], linkage.edge_mm, progress)
+        }
         Solver::Projection => {
             projection::solve(&problem, start, closest, linkage.edge_mm, progress)
         }
     }
+}
+
+/// The exact linkage next to `places`: each point is drawn to a place of its own (millimetres) with a weight from 0 to 1,
+/// from `start`, where all points in `pinned` stay. For shapes that are posed by hand rather than given by a surface.
+///
+/// # Errors
+/// [`RationalizeError`]: interruption, memory.
+pub fn settle(
+    linkage: &Linkage,
+    start: &[Point3<f64>],
+    places: &[(Point3<f64>, f64)],
+    pinned: &[PointId],
+    sigma: f64,
+    progress: &dyn Progress,
+) -> Result<(Vec<Point3<f64>>, Effort), RationalizeError> {
+    let problem = Problem::new(linkage, sigma);
+    let pinned: Vec<u32> = pinned.iter().map(|p| p.0).collect();
+    let target = exact::Target::Places(places);
+    exact::solve(&problem, start, target, &pinned, linkage.edge_mm, progress)
 }
 
 /// The scale factor λ of every hinge at `positions` (millimetres, by point), in the order of the linkage's hinges.

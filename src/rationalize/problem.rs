@@ -18,6 +18,9 @@ use crate::linkage::Linkage;
 /// together. It costs 1.1° at a fully open hinge, λ = 1.9999.
 pub(crate) const OPEN_MARGIN: f64 = 0.02;
 
+/// A triangle whose doubled area (in L²) is below this has collapsed: its normal means nothing.
+const COLLAPSED: f64 = 1e-12;
+
 /// Points of a hinge: `[h, b1, a1, a2, b2]`.
 pub(crate) type HingePoints = [u32; 5];
 
@@ -74,7 +77,7 @@ fn signed_side(
 ) -> Option<(f64, [Vector3<f64>; 3])> {
     let normal = a.cross(&b);
     let length = normal.norm();
-    if length < 1e-12 {
+    if length < COLLAPSED {
         return None;
     }
     let n = normal / length;
@@ -93,7 +96,7 @@ fn signed_side(
     Some((value, [da, db, dc]))
 }
 
-/// Which of the four conditions on a hinge's arms.
+/// What a hinge's arms must keep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Condition {
     /// (3): the second triangle stays out of the first.
@@ -104,26 +107,47 @@ pub(crate) enum Condition {
     FirstOpen,
     /// (6): open at most 180°, seen from the second.
     SecondOpen,
+    /// λ ≤ σ.
+    Scale,
+}
+
+/// All conditions, in the order of [`hinge_violations`].
+pub(crate) const CONDITIONS: [Condition; 5] = [
+    Condition::SecondClear,
+    Condition::FirstClear,
+    Condition::FirstOpen,
+    Condition::SecondOpen,
+    Condition::Scale,
+];
+
+/// By how much a hinge violates each of [`CONDITIONS`], in L; negative where it keeps them, −∞ where a triangle has
+/// collapsed and there is nothing to say.
+#[inline]
+pub(crate) fn hinge_violations(p: &[Vector3<f64>; 5], sigma: f64) -> [f64; 5] {
+    let (v1, v2, v3, v4) = (p[1] - p[0], p[2] - p[0], p[3] - p[0], p[4] - p[0]);
+    let (first, second, across) = (v1.cross(&v2), v4.cross(&v3), v2.cross(&v3));
+    let per = |normal: &Vector3<f64>| {
+        let length = normal.norm();
+        if length < COLLAPSED {
+            f64::NAN
+        } else {
+            1.0 / length
+        }
+    };
+    let (first_per, second_per) = (per(&first), per(&second));
+    let open = |value: f64| (OPEN_MARGIN - value).max(f64::NEG_INFINITY);
+    [
+        (-first.dot(&across) * first_per).max(f64::NEG_INFINITY),
+        (second.dot(&across) * second_per).max(f64::NEG_INFINITY),
+        open(first.dot(&v1.cross(&v3)) * first_per),
+        open(second.dot(&v4.cross(&v2)) * second_per),
+        3f64.sqrt() / 3.0 * (v1 + v2 - v3 - v4).norm() - sigma,
+    ]
 }
 
 impl Condition {
-    pub const ALL: [Self; 4] = [
-        Self::SecondClear,
-        Self::FirstClear,
-        Self::FirstOpen,
-        Self::SecondOpen,
-    ];
-
-    /// The value that it must not fall below.
-    #[inline]
-    pub fn margin(self) -> f64 {
-        match self {
-            Self::SecondClear | Self::FirstClear => 0.0,
-            Self::FirstOpen | Self::SecondOpen => OPEN_MARGIN,
-        }
-    }
-
-    /// The signed length at a hinge with points `[h, b1, a1, a2, b2]`; `None` where a triangle has collapsed.
+    /// The signed length at a hinge with points `[h, b1, a1, a2, b2]`, or its scale factor; `None` where a triangle has
+    /// collapsed.
     #[inline]
     pub fn evaluate(self, p: &[Vector3<f64>; 5]) -> Option<Signed> {
         let (v1, v2, v3, v4) = (p[1] - p[0], p[2] - p[0], p[3] - p[0], p[4] - p[0]);
@@ -137,8 +161,19 @@ impl Condition {
                 let (value, [d4, d3, d2]) = signed_side(v4, v3, v2, self == Self::SecondOpen)?;
                 (value, [-(d4 + d3 + d2), zero, d2, d3, d4])
             }
+            Self::Scale => return Some(hinge_scale(p)),
         };
         Some(Signed { value, gradient })
+    }
+
+    /// The gradient of its violation with respect to `[h, b1, a1, a2, b2]`; `None` where a triangle has collapsed.
+    #[inline]
+    pub fn violation_gradient(self, p: &[Vector3<f64>; 5]) -> Option<[Vector3<f64>; 5]> {
+        let gradient = self.evaluate(p)?.gradient;
+        Some(match self {
+            Self::Scale => gradient,
+            _ => gradient.map(|g| -g),
+        })
     }
 }
 
@@ -204,6 +239,22 @@ mod tests {
 
     proptest! {
         #[test]
+        fn violations_are_the_conditions_below_their_margins(
+            raw in prop::array::uniform15(-1.0..1.0f64), sigma in 1.0..2.0f64,
+        ) {
+            let p: [Vector3<f64>; 5] = std::array::from_fn(|i| Vector3::new(raw[3 * i], raw[3 * i + 1], raw[3 * i + 2]));
+            for (condition, violation) in CONDITIONS.into_iter().zip(hinge_violations(&p, sigma)) {
+                let value = condition.evaluate(&p).unwrap().value;
+                let expected = match condition {
+                    Condition::SecondClear | Condition::FirstClear => -value,
+                    Condition::FirstOpen | Condition::SecondOpen => OPEN_MARGIN - value,
+                    Condition::Scale => value - sigma,
+                };
+                prop_assert!((violation - expected).abs() < 1e-12);
+            }
+        }
+
+        #[test]
         fn gradients_agree_with_differences(seed in prop::array::uniform15(-0.2..0.2f64), gap in -0.3..2.0f64) {
             let mut p = pair(gap);
             for (k, s) in seed.iter().enumerate() {
@@ -221,10 +272,9 @@ mod tests {
                 }
                 Ok(())
             };
-            for condition in Condition::ALL {
+            for condition in CONDITIONS {
                 check(&|p| condition.evaluate(p).unwrap())?;
             }
-            check(&|p| hinge_scale(p))?;
         }
     }
 }
