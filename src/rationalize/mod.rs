@@ -6,6 +6,7 @@
 
 mod exact;
 mod grid;
+mod overlap;
 mod problem;
 mod projection;
 mod quality;
@@ -13,8 +14,9 @@ mod quality;
 use nalgebra::{Point3, Vector3};
 
 pub use exact::{Effort, STAGE_COUNT};
+pub use overlap::OVERLAP_TOLERANCE;
 pub use problem::Problem;
-pub use quality::{OVERLAP_TOLERANCE, Quality, SIGMA_TOLERANCE, Worst, failing};
+pub use quality::{Quality, SIGMA_TOLERANCE, Worst, failing};
 
 use crate::base::progress::{Interrupted, Progress};
 use crate::base::sparse::FactorError;

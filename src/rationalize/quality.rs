@@ -3,13 +3,11 @@
 use nalgebra::{Point3, Vector3};
 
 use super::grid::PointGrid;
+use super::overlap::{OVERLAP_TOLERANCE, centroids, crossing};
 use super::problem::{Condition, Problem, hinge_scale};
 use crate::base::ids::Id as _;
 use crate::linkage::{Linkage, PointId, TriangleId};
 use crate::mesh::{ClosestPoint, Surface, distance_to_triangle};
-
-/// Depth in L below which an overlap is rounding, not an overlap: a hundredth of a kerf even for large triangles.
-pub const OVERLAP_TOLERANCE: f64 = 1e-4;
 
 /// A hinge that opens farther than 180° by more than this (radians) counts as over-opened.
 const OPEN_SLACK: f64 = 1e-3;
@@ -136,7 +134,7 @@ impl Quality {
             over_sigma += usize::from(scale > sigma + SIGMA_TOLERANCE || over_open);
         }
 
-        let centroids = centroids(&problem, &x);
+        let centroids = centroids(&problem.triangles, &x);
         let facing_away = problem
             .triangles
             .iter()
@@ -145,7 +143,7 @@ impl Quality {
                 faces_away(&t.map(|i| x[i as usize]), centroid, closest, edge_mm)
             })
             .count();
-        let (intersections, crossing) = intersections(&problem, &x, &centroids);
+        let (intersections, one) = intersections(&problem, &x, &centroids);
 
         Self {
             triangles: problem.triangles.len(),
@@ -158,7 +156,7 @@ impl Quality {
             penetrations,
             penetration_depth,
             intersections,
-            intersection_at: crossing.map(|t| worst(1.0, linkage.triangles[t].points[0].index())),
+            intersection_at: one.map(|t| worst(1.0, linkage.triangles[t].points[0].index())),
             facing_away,
             opening,
             opening_max,
@@ -185,7 +183,7 @@ pub fn failing(
         .iter()
         .map(|p| closest.query(*p).distance > accept_distance * edge_mm)
         .collect();
-    let centroids = centroids(&problem, &x);
+    let centroids = centroids(&problem.triangles, &x);
     let mut fails: Vec<bool> = problem
         .triangles
         .iter()
@@ -201,7 +199,7 @@ pub fn failing(
             fails[hinge.cw.triangle.index()] = true;
         }
     }
-    intersecting(&problem, &x, &centroids, |a, b| {
+    crossing(&problem.triangles, &x, &centroids, |a, b| {
         (fails[a], fails[b]) = (true, true)
     });
     (0..fails.len())
@@ -217,14 +215,6 @@ fn penetration(p: &[Vector3<f64>; 5]) -> (f64, f64) {
     let depth = -value(Condition::SecondClear).min(value(Condition::FirstClear));
     let past = -value(Condition::FirstOpen).min(value(Condition::SecondOpen));
     (depth, past)
-}
-
-fn centroids(problem: &Problem, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-    problem
-        .triangles
-        .iter()
-        .map(|t| t.iter().map(|&i| x[i as usize]).sum::<Vector3<f64>>() / 3.0)
-        .collect()
 }
 
 /// Whether a triangle (in L) faces away from the surface where that is nearest.
@@ -245,57 +235,11 @@ fn intersections(
     centroids: &[Vector3<f64>],
 ) -> (usize, Option<TriangleId>) {
     let (mut count, mut first) = (0, None);
-    intersecting(problem, x, centroids, |a, _| {
+    crossing(&problem.triangles, x, centroids, |a, _| {
         count += 1;
         first.get_or_insert(TriangleId::from_index(a));
     });
     (count, first)
-}
-
-/// Tells of every pair of triangles without a common point that cross.
-fn intersecting(
-    problem: &Problem,
-    x: &[Vector3<f64>],
-    centroids: &[Vector3<f64>],
-    mut tell: impl FnMut(usize, usize),
-) {
-    // Circumradius 1/√3: centroids of triangles that meet are no farther apart than twice that.
-    let reach = 2.0 / 3f64.sqrt();
-    let grid = PointGrid::new(centroids, reach);
-    for (n, centre) in centroids.iter().enumerate() {
-        grid.near(centre, reach, |other| {
-            if other <= n
-                || problem.triangles[n]
-                    .iter()
-                    .any(|i| problem.triangles[other].contains(i))
-            {
-                return;
-            }
-            let [a, b] = [n, other].map(|t| problem.triangles[t].map(|i| x[i as usize]));
-            if edges_cross(&a, &b) || edges_cross(&b, &a) {
-                tell(n, other);
-            }
-        });
-    }
-}
-
-/// True if an edge of `a` passes through the inside of `b` by more than the tolerance.
-fn edges_cross(a: &[Vector3<f64>; 3], b: &[Vector3<f64>; 3]) -> bool {
-    let Some(normal) = (b[1] - b[0]).cross(&(b[2] - b[0])).try_normalize(0.0) else {
-        return false;
-    };
-    (0..3).any(|k| {
-        let (p, q) = (a[k], a[(k + 1) % 3]);
-        let (dp, dq) = ((p - b[0]).dot(&normal), (q - b[0]).dot(&normal));
-        if dp.min(dq) > -OVERLAP_TOLERANCE || dp.max(dq) < OVERLAP_TOLERANCE {
-            return false;
-        }
-        let at = p + (q - p) * (dp / (dp - dq));
-        (0..3).all(|s| {
-            let edge = b[(s + 1) % 3] - b[s];
-            edge.cross(&(at - b[s])).dot(&normal) > OVERLAP_TOLERANCE * edge.norm()
-        })
-    })
 }
 
 /// Part of the surface's area that lies within [`COVERAGE_RADIUS`] of a triangle, sampled at every face's centroid
