@@ -5,6 +5,7 @@
 //! either, [`Soundness`] the part of it that needs no surface. [`freedom()`] counts and finds the degrees of freedom that
 //! a linkage has left, [`softest`] the motions that cost least.
 
+mod bounds;
 mod exact;
 mod freedom;
 mod grid;
@@ -16,6 +17,7 @@ mod quality;
 
 use nalgebra::{Point3, Vector3};
 
+pub use bounds::Bounds;
 pub use exact::{Effort, STAGE_COUNT};
 pub use freedom::{Freedom, FreedomError, Mobility, freedom};
 pub use motion::{MOST_MOTIONS, Motion, motions_obj, softest};

@@ -104,6 +104,8 @@ const GAIN: f64 = 0.02;
 const PARTINGS: usize = 6;
 /// The stage that the solve goes back to in each of them.
 const RESUME: usize = 2;
+/// In the last stage a factor serves again after a step that left less than this part of the energy.
+const CHORD: f64 = 1e-3;
 /// Edges are exact when none is off by more than this, in L; conditions when none is violated by more.
 const EXACT: f64 = 1e-13;
 /// A hinge gets its blocks when one of its bounds is nearer than this at the start, in L.
@@ -439,15 +441,20 @@ impl<'a> Solver<'a> {
         self.trial_draws.copy_from_slice(&self.draws);
         let mut energy = self.energy(stage);
         let mut damping = (DAMPING * stage.weight * stage.weight).max(LAST_DAMPING);
+        let mut factored = false;
         for _ in 0..steps {
             if last && self.violation() < EXACT {
                 break;
             }
+            let analyses = self.effort.analyses;
             self.assemble(stage)?;
-            let Some(there) = self.descend(stage, energy, &mut damping, progress)? else {
+            factored &= analyses == self.effort.analyses;
+            let Some(there) = self.descend(stage, energy, factored, &mut damping, progress)? else {
                 break;
             };
             self.effort.steps += 1;
+            // Near the end the last factor is as good as a new one.
+            factored = last && there < CHORD * energy;
             let gained = energy - there;
             energy = there;
             if !last && gained < GAIN * (gained + there) {
@@ -457,11 +464,13 @@ impl<'a> Solver<'a> {
         Ok(())
     }
 
-    /// One step from `x` that lowers the energy, and the energy there; none if there is little left to gain.
+    /// One step from `x` that lowers the energy, and the energy there; none if there is little left to gain. `factored`
+    /// if the factor of the step before is to be tried first.
     fn descend(
         &mut self,
         stage: &Stage,
         energy: f64,
+        mut factored: bool,
         damping: &mut f64,
         progress: &dyn Progress,
     ) -> Result<Option<f64>, RationalizeError> {
@@ -469,15 +478,17 @@ impl<'a> Solver<'a> {
         let mut growth = 6.0;
         while *damping < 1e6 {
             progress.check()?;
-            self.effort.factorizations += 1;
-            match self.system.factor(*damping) {
-                Ok(()) => {}
-                Err(FactorError::NotPositiveDefinite) => {
-                    *damping = (*damping * growth).max(1e-12);
-                    growth *= 4.0;
-                    continue;
+            if !factored {
+                self.effort.factorizations += 1;
+                match self.system.factor(*damping) {
+                    Ok(()) => {}
+                    Err(FactorError::NotPositiveDefinite) => {
+                        *damping = (*damping * growth).max(1e-12);
+                        growth *= 4.0;
+                        continue;
+                    }
+                    Err(other) => return Err(other.into()),
                 }
-                Err(other) => return Err(other.into()),
             }
             let promised = self.system.solve(&mut self.step);
             let moved = self.trial.iter_mut().zip(&self.x);
@@ -492,8 +503,14 @@ impl<'a> Solver<'a> {
             if there < energy {
                 std::mem::swap(&mut self.x, &mut self.trial);
                 std::mem::swap(&mut self.draws, &mut self.trial_draws);
-                *damping /= 5.0;
+                if !factored {
+                    *damping /= 5.0;
+                }
                 return Ok(Some(there));
+            }
+            if factored {
+                factored = false;
+                continue;
             }
             let longest = self.step.iter().fold(0.0f64, |m, s| m.max(s.abs()));
             let little = if stage.rounding > 0.0 {
