@@ -9,12 +9,15 @@ mod grid;
 mod problem;
 mod projection;
 mod quality;
+pub mod session;
 
 use nalgebra::{Point3, Vector3};
 
 pub use exact::Effort;
 pub use problem::Problem;
+pub use projection::{AlternatingProjection, Closeness, ProjectionOptions, Rest, Separation};
 pub use quality::{OVERLAP_TOLERANCE, Quality, SIGMA_TOLERANCE, Worst, failing};
+pub use session::{Edit, EditError, Hold, Session, Step};
 
 use crate::base::progress::{Interrupted, Progress};
 use crate::base::sparse::FactorError;

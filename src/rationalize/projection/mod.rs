@@ -1,0 +1,264 @@
+//! The paper's solver: alternating projections (paper, §4.2, eq. 2; Bouaziz et al. 2012), as fast as a preview needs.
+//!
+//! Local steps: every edge is projected onto length L, every point onto the surface, every pair of neighbouring
+//! triangles that penetrates onto an approximate feasible set. Global step: one linear solve whose matrix depends on
+//! the closeness weight only. Conditions (5), (6) and the σ bound are not part of it; the result shows what they are
+//! for. Preview and reference; [`super::exact`] is what a sheet is cut from.
+//!
+//! Three things make it fast without changing what it computes: the solve runs over triangles instead of points
+//! ([`global`]), the iteration is accelerated and refuses steps that raise the energy ([`anderson`]), and a local step
+//! is worked out only where its condition is broken ([`kernel`]).
+
+mod anderson;
+mod global;
+pub(crate) mod kernel;
+mod separate;
+
+use std::ops::Deref;
+
+use nalgebra::{Point3, Vector3};
+
+pub use separate::Separation;
+
+pub use self::kernel::Rest;
+use self::kernel::{Kernel, Outcome, Rules};
+use super::RationalizeError;
+use super::exact::Effort;
+use super::problem::Problem;
+use crate::base::progress::Progress;
+use crate::linkage::Linkage;
+use crate::mesh::{ClosestPoint, ClosestTracker};
+
+/// The weight of closeness rises geometrically from w₁ = 0.001 to 0.1 in this many levels; each costs one
+/// factorisation.
+const LEVELS: usize = 10;
+const FIRST_WEIGHT: f64 = 0.001;
+const LAST_WEIGHT: f64 = 0.1;
+
+/// Where on the surface each point is drawn to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Closeness {
+    /// To the point of the surface closest to where the lift put it, fixed: for a first impression.
+    Held,
+    /// To the point of the surface closest to where it is.
+    #[default]
+    Tracked,
+}
+
+/// How to run it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProjectionOptions {
+    /// The projection onto non-penetration.
+    pub separation: Separation,
+    /// What the points are drawn to.
+    pub closeness: Closeness,
+    /// Iterations while the weight of closeness rises.
+    pub rising: usize,
+    /// Iterations at the final weight.
+    pub finishing: usize,
+    /// Differences that Anderson acceleration looks back, at most 8. With 0 there is neither acceleration nor a guard
+    /// against steps that raise the energy: the iteration as published.
+    pub window: usize,
+}
+
+impl Default for ProjectionOptions {
+    /// The whole schedule of the paper, accelerated: 50 iterations and an additional 200.
+    fn default() -> Self {
+        Self {
+            separation: Separation::InPlane,
+            closeness: Closeness::Tracked,
+            rising: 50,
+            finishing: 200,
+            window: 5,
+        }
+    }
+}
+
+impl ProjectionOptions {
+    /// For a first impression: 30 iterations with the closest points held ("20–50 iterations for visual feedback").
+    pub fn preview() -> Self {
+        Self {
+            closeness: Closeness::Held,
+            rising: 30,
+            finishing: 0,
+            ..Self::default()
+        }
+    }
+
+    /// The paper's solver to the letter, but for Appendix B's index.
+    pub fn as_printed() -> Self {
+        Self {
+            separation: Separation::Printed,
+            window: 0,
+            ..Self::default()
+        }
+    }
+}
+
+/// The solver, iteration by iteration.
+pub struct AlternatingProjection<'a> {
+    kernel: Kernel,
+    tracker: Option<ClosestTracker<&'a ClosestPoint>>,
+    edge_mm: f64,
+    options: ProjectionOptions,
+    weight: f64,
+    iterations: usize,
+    refused: usize,
+}
+
+impl<'a> AlternatingProjection<'a> {
+    /// At `start` (millimetres, one position a point of the linkage), before the first iteration.
+    ///
+    /// # Errors
+    /// [`RationalizeError::Factor`]: memory.
+    pub fn new(
+        linkage: &Linkage,
+        start: &[Point3<f64>],
+        closest: &'a ClosestPoint,
+        options: &ProjectionOptions,
+    ) -> Result<Self, RationalizeError> {
+        Self::of(
+            &Problem::new(linkage, 2.0),
+            linkage.edge_mm,
+            start,
+            closest,
+            options,
+        )
+    }
+
+    fn of(
+        problem: &Problem,
+        edge_mm: f64,
+        start: &[Point3<f64>],
+        closest: &'a ClosestPoint,
+        options: &ProjectionOptions,
+    ) -> Result<Self, RationalizeError> {
+        let rules = Rules {
+            separation: options.separation,
+            bounds: None,
+            smoothness: 0.0,
+            rest: Rest::Flat,
+        };
+        let x: Vec<Vector3<f64>> = start.iter().map(|p| p.coords / edge_mm).collect();
+        let mut this = Self {
+            kernel: Kernel::new(problem, &x, rules, options.window)?,
+            tracker: Some(ClosestTracker::new(closest, problem.points)),
+            edge_mm,
+            options: *options,
+            weight: 0.0,
+            iterations: 0,
+            refused: 0,
+        };
+        this.set_weight(FIRST_WEIGHT)?;
+        if options.closeness == Closeness::Held {
+            this.tracker = None;
+        }
+        Ok(this)
+    }
+
+    /// The weight w₁ of closeness from the next iteration on. A new one costs a factorisation.
+    ///
+    /// # Errors
+    /// [`RationalizeError::Factor`]: the weight is not a positive number.
+    pub fn set_weight(&mut self, weight: f64) -> Result<(), RationalizeError> {
+        if weight != self.weight {
+            self.weight = weight;
+            self.kernel.pull_all(weight);
+            self.kernel.refactor()?;
+            self.kernel
+                .restart(&mut follow(&mut self.tracker, self.edge_mm));
+        }
+        Ok(())
+    }
+
+    /// One iteration.
+    pub fn iterate(&mut self) {
+        let outcome = self
+            .kernel
+            .iterate(&mut follow(&mut self.tracker, self.edge_mm));
+        self.iterations += 1;
+        self.refused += usize::from(outcome == Outcome::Plain);
+    }
+
+    /// Runs the whole schedule.
+    ///
+    /// # Errors
+    /// [`RationalizeError`]: interruption, memory.
+    pub fn run(&mut self, progress: &dyn Progress) -> Result<(), RationalizeError> {
+        let ProjectionOptions {
+            rising, finishing, ..
+        } = self.options;
+        for iteration in 0..rising + finishing {
+            progress.check()?;
+            let level =
+                (iteration * LEVELS / rising.max(1)).min(LEVELS - 1) as f64 / (LEVELS - 1) as f64;
+            self.set_weight(FIRST_WEIGHT * (LAST_WEIGHT / FIRST_WEIGHT).powf(level))?;
+            self.iterate();
+            progress.advance(1);
+        }
+        Ok(())
+    }
+
+    /// The energy (2) where the points are, in L².
+    pub fn energy(&self) -> f64 {
+        self.kernel.energy()
+    }
+
+    /// Positions in millimetres, by point of the linkage.
+    pub fn positions(&self) -> Vec<Point3<f64>> {
+        self.kernel
+            .positions()
+            .map(|p| Point3::from(p * self.edge_mm))
+            .collect()
+    }
+
+    /// What was done so far.
+    pub fn effort(&self) -> Effort {
+        Effort {
+            steps: self.iterations,
+            factorizations: self.kernel.factorizations(),
+        }
+    }
+
+    /// Iterations that took the plain step instead of the accelerated one.
+    pub fn plain_steps(&self) -> usize {
+        self.refused
+    }
+
+    /// Rows of the linear system and entries of its factor below the diagonal.
+    pub fn factor_size(&self) -> (usize, usize) {
+        self.kernel.factor_size()
+    }
+}
+
+/// Moves the places on the surface after the points; without a tracker they stay.
+pub(super) fn follow<C: Deref<Target = ClosestPoint>>(
+    tracker: &mut Option<ClosestTracker<C>>,
+    edge_mm: f64,
+) -> impl FnMut(&[[f64; 3]], &mut [[f64; 3]]) {
+    move |x, targets| {
+        if let Some(tracker) = tracker {
+            for (i, (x, target)) in x.iter().zip(targets).enumerate() {
+                let found = tracker.query(i, Point3::from(*x) * edge_mm);
+                *target = (found.point / edge_mm).into();
+            }
+        }
+    }
+}
+
+/// Runs the schedule from `start` (millimetres) towards the surface of `closest`.
+///
+/// # Errors
+/// [`RationalizeError`]: interruption, memory.
+pub(crate) fn solve(
+    problem: &Problem,
+    start: &[Point3<f64>],
+    closest: &ClosestPoint,
+    edge_mm: f64,
+    progress: &dyn Progress,
+) -> Result<(Vec<Point3<f64>>, Effort), RationalizeError> {
+    let options = ProjectionOptions::default();
+    let mut solver = AlternatingProjection::of(problem, edge_mm, start, closest, &options)?;
+    solver.run(progress)?;
+    Ok((solver.positions(), solver.effort()))
+}
