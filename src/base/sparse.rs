@@ -236,7 +236,8 @@ impl Triangle {
         for (j, column) in columns.iter().enumerate() {
             starts[j + 1] = starts[j] + column.len() as u32;
         }
-        let (mut slots, mut diagonal_slots) = (Vec::with_capacity(starts[size] as usize), vec![0; size]);
+        let (mut slots, mut diagonal_slots) =
+            (Vec::with_capacity(starts[size] as usize), vec![0; size]);
         // Position in its stored column by row, valid for the rows of one (super)node at a time.
         let mut place = vec![0u32; size];
         match cholesky.symbolic.raw() {
@@ -252,7 +253,10 @@ impl Triangle {
             }
             SymbolicCholeskyRaw::Supernodal(supernodal) => {
                 for s in 0..supernodal.n_supernodes() {
-                    let (start, end) = (supernodal.supernode_begin()[s], supernodal.supernode_end()[s]);
+                    let (start, end) = (
+                        supernodal.supernode_begin()[s],
+                        supernodal.supernode_end()[s],
+                    );
                     let pattern = supernodal.supernode(s).pattern();
                     let height = end - start + pattern.len() as u32;
                     for (k, row) in (start..end).chain(pattern.iter().copied()).enumerate() {
@@ -420,9 +424,8 @@ mod tests {
     #[test]
     fn the_triangle_solves_as_the_factor_does() {
         for (size, reach) in [(60usize, 2usize), (90, 60)] {
-            let pairs = (0..size as u32).flat_map(|i| {
-                (1..=reach as u32).map(move |k| (i, (i * 7 + k * k) % size as u32))
-            });
+            let pairs = (0..size as u32)
+                .flat_map(|i| (1..=reach as u32).map(move |k| (i, (i * 7 + k * k) % size as u32)));
             let pairs: Vec<_> = pairs.filter(|(i, j)| i != j).collect();
             let mut solver = Cholesky::new(Pattern::new(size, pairs.clone())).unwrap();
             let mut triangle = Triangle::new(&solver);
@@ -440,7 +443,9 @@ mod tests {
                 solver.factor(&values).unwrap();
                 triangle.refresh(&solver);
                 let side = |c: usize| -> Vec<f64> {
-                    (0..size).map(|i| ((i * (c + 1)) as f64 * 0.7).sin()).collect()
+                    (0..size)
+                        .map(|i| ((i * (c + 1)) as f64 * 0.7).sin())
+                        .collect()
                 };
                 let mut rows: Vec<[f64; 3]> = triangle
                     .order()

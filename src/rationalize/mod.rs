@@ -6,6 +6,7 @@
 
 mod exact;
 mod grid;
+pub mod pose;
 mod problem;
 mod projection;
 mod quality;

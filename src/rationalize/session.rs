@@ -23,11 +23,11 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 
 use super::projection::kernel::{Kernel, Outcome, Rest, Rules};
-use super::projection::{Separation, follow};
+use super::projection::{Follower, Separation};
 use super::{Problem, RationalizeError};
 use crate::base::ids::Id as _;
 use crate::linkage::{Linkage, PointId, TriangleId};
-use crate::mesh::{ClosestPoint, ClosestTracker};
+use crate::mesh::ClosestPoint;
 
 /// Differences that the acceleration looks back.
 const WINDOW: usize = 5;
@@ -145,12 +145,14 @@ pub struct Session {
     problem: Problem,
     edge_mm: f64,
     kernel: Kernel,
-    tracker: Option<ClosestTracker<Arc<ClosestPoint>>>,
+    follower: Option<Follower<Arc<ClosestPoint>>>,
     held: BTreeMap<u32, Held>,
     /// The matrix no longer fits weights and held points.
     stale_matrix: bool,
     /// The energy no longer fits.
     stale_energy: bool,
+    /// The places on the target are not those of the points.
+    stale_places: bool,
 }
 
 impl Session {
@@ -171,10 +173,11 @@ impl Session {
             kernel: Kernel::new(&problem, &x, rules, WINDOW)?,
             problem,
             edge_mm: linkage.edge_mm,
-            tracker: None,
+            follower: None,
             held: BTreeMap::new(),
             stale_matrix: true,
             stale_energy: true,
+            stale_places: false,
         })
     }
 
@@ -274,7 +277,8 @@ impl Session {
                         None => (None, 0.0),
                     };
                     self.stale_matrix |= self.kernel.pull_all(weight);
-                    self.tracker = surface.map(|s| ClosestTracker::new(s, self.problem.points));
+                    self.follower = surface.map(|s| Follower::new(s, &self.kernel, self.edge_mm));
+                    self.stale_places = true;
                 }
                 Edit::Handle { .. } | Edit::Pin(_) | Edit::Release(_) => {}
             }
@@ -285,6 +289,7 @@ impl Session {
         };
         self.stale_matrix |= weights(&self.held) != weights(&held);
         self.stale_energy = true;
+        self.stale_places |= self.follower.is_some() && !places.is_empty();
         self.held = held;
         self.put();
         Ok(())
@@ -318,11 +323,19 @@ impl Session {
             self.kernel.refactor()?;
             self.stale_matrix = false;
         }
-        let mut track = follow(&mut self.tracker, self.edge_mm);
-        if self.stale_energy {
+        let follower = &mut self.follower;
+        let mut track = |x: &[[f64; 3]], places: &mut [[f64; 3]]| {
+            if let Some(follower) = follower {
+                follower.follow(x, places);
+            }
+        };
+        if self.stale_places {
             self.kernel.restart(&mut track);
-            self.stale_energy = false;
+        } else if self.stale_energy {
+            // No point has moved.
+            self.kernel.restart(&mut |_, _| {});
         }
+        (self.stale_energy, self.stale_places) = (false, false);
         let outcome = self.kernel.iterate(&mut track);
         Ok(Step {
             energy: self.kernel.energy(),
@@ -420,7 +433,7 @@ fn positive(what: &'static str, value: f64) -> Result<(), EditError> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::linkage::{Colour, Handedness};
     use crate::mesh::Sample;
@@ -430,7 +443,7 @@ mod tests {
 
     /// A flat hexagon of triangles, opened evenly to the scale `lambda` (design: each triangle turns by
     /// asin(λ/2) − 30°, by colour).
-    fn opened(radius: i32, lambda: f64) -> (Linkage, Vec<Point3<f64>>) {
+    pub(in crate::rationalize) fn opened(radius: i32, lambda: f64) -> (Linkage, Vec<Point3<f64>>) {
         let linkage = Linkage::patch(EDGE, Handedness::Right, &Linkage::hexagon_cells(radius));
         let turn = (lambda / 2.0).asin() - std::f64::consts::FRAC_PI_6;
         let mut start = vec![Point3::origin(); linkage.point_count()];

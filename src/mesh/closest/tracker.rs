@@ -14,15 +14,16 @@ use super::{Candidate, Closest, ClosestPoint, DEPTH};
 /// Faces in a list at the most. If more are in reach, the ball shrinks until they are not.
 const FACES: usize = 12;
 
-/// A ball is made for this many movements like the last ones.
-const STEPS: f64 = 24.0;
+/// A ball is made for this many movements like the last ones, between these two by the number of the point: points that
+/// move alike should not all need a new ball at the same time.
+const STEPS: [f64; 2] = [12.0, 36.0];
 
 /// Bounds on its radius, as parts of the mean edge of the surface. Below the lower a list is as short as it gets;
 /// above the upper it is full.
 const SMALLEST: f64 = 0.02;
 const LARGEST: f64 = 1.0;
 
-/// The radius of the first ball, likewise: nothing is known of the movement yet.
+/// The radius of the first ball, likewise.
 const FIRST: f64 = 0.2;
 
 /// Part of the size of the surface (and of the distance from its middle) by which a ball is smaller than it might be:
@@ -146,10 +147,14 @@ impl<C: Deref<Target = ClosestPoint>> ClosestTracker<C> {
         let best = self.closest.search(&p, ball.hint);
         let distance = best.hit.squared.sqrt();
         let wanted = if ball.age == 0 && ball.radius < 0.0 && ball.count == 0 {
+            // Nothing is known of its movement yet.
             FIRST * self.edge
         } else {
             let step = moved / f64::from(ball.age + 1);
-            (STEPS * step).clamp(SMALLEST * self.edge, LARGEST * self.edge)
+            // Multiples of the golden ratio spread evenly, however many there are.
+            let part = (point as f64 * 0.618_033_988_749_895).fract();
+            let steps = STEPS[0] + (STEPS[1] - STEPS[0]) * part;
+            (steps * step).clamp(SMALLEST * self.edge, LARGEST * self.edge)
         };
         let slack = ROUNDING * (self.size + (p - self.middle).norm()) + 1e-9 * distance;
         let mut list = Shortlist::new(distance + 2.0 * wanted + slack);

@@ -565,6 +565,11 @@ impl Kernel {
         (self.corners.len(), self.global.entries())
     }
 
+    /// For every point of the linkage its number here.
+    pub fn places(&self) -> &[u32] {
+        &self.place
+    }
+
     /// Where a point of the linkage is.
     pub fn position(&self, point: u32) -> Vector3<f64> {
         at(&self.x, self.place[point as usize])

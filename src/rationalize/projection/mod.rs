@@ -10,16 +10,16 @@
 //! is worked out only where its condition is broken ([`kernel`]).
 
 mod anderson;
+mod follow;
 mod global;
 pub(crate) mod kernel;
 mod separate;
-
-use std::ops::Deref;
 
 use nalgebra::{Point3, Vector3};
 
 pub use separate::Separation;
 
+pub(super) use self::follow::Follower;
 pub use self::kernel::Rest;
 use self::kernel::{Kernel, Outcome, Rules};
 use super::RationalizeError;
@@ -27,7 +27,7 @@ use super::exact::Effort;
 use super::problem::Problem;
 use crate::base::progress::Progress;
 use crate::linkage::Linkage;
-use crate::mesh::{ClosestPoint, ClosestTracker};
+use crate::mesh::ClosestPoint;
 
 /// The weight of closeness rises geometrically from w₁ = 0.001 to 0.1 in this many levels; each costs one
 /// factorisation.
@@ -98,7 +98,7 @@ impl ProjectionOptions {
 /// The solver, iteration by iteration.
 pub struct AlternatingProjection<'a> {
     kernel: Kernel,
-    tracker: Option<ClosestTracker<&'a ClosestPoint>>,
+    follower: Option<Follower<&'a ClosestPoint>>,
     edge_mm: f64,
     options: ProjectionOptions,
     weight: f64,
@@ -140,9 +140,10 @@ impl<'a> AlternatingProjection<'a> {
             rest: Rest::Flat,
         };
         let x: Vec<Vector3<f64>> = start.iter().map(|p| p.coords / edge_mm).collect();
+        let kernel = Kernel::new(problem, &x, rules, options.window)?;
         let mut this = Self {
-            kernel: Kernel::new(problem, &x, rules, options.window)?,
-            tracker: Some(ClosestTracker::new(closest, problem.points)),
+            follower: Some(Follower::new(closest, &kernel, edge_mm)),
+            kernel,
             edge_mm,
             options: *options,
             weight: 0.0,
@@ -151,7 +152,7 @@ impl<'a> AlternatingProjection<'a> {
         };
         this.set_weight(FIRST_WEIGHT)?;
         if options.closeness == Closeness::Held {
-            this.tracker = None;
+            this.follower = None;
         }
         Ok(this)
     }
@@ -165,17 +166,24 @@ impl<'a> AlternatingProjection<'a> {
             self.weight = weight;
             self.kernel.pull_all(weight);
             self.kernel.refactor()?;
-            self.kernel
-                .restart(&mut follow(&mut self.tracker, self.edge_mm));
+            let follower = &mut self.follower;
+            self.kernel.restart(&mut |x, places| {
+                if let Some(follower) = follower {
+                    follower.follow(x, places);
+                }
+            });
         }
         Ok(())
     }
 
     /// One iteration.
     pub fn iterate(&mut self) {
-        let outcome = self
-            .kernel
-            .iterate(&mut follow(&mut self.tracker, self.edge_mm));
+        let follower = &mut self.follower;
+        let outcome = self.kernel.iterate(&mut |x, places| {
+            if let Some(follower) = follower {
+                follower.follow(x, places);
+            }
+        });
         self.iterations += 1;
         self.refused += usize::from(outcome == Outcome::Plain);
     }
@@ -228,21 +236,6 @@ impl<'a> AlternatingProjection<'a> {
     /// Rows of the linear system and entries of its factor below the diagonal.
     pub fn factor_size(&self) -> (usize, usize) {
         self.kernel.factor_size()
-    }
-}
-
-/// Moves the places on the surface after the points; without a tracker they stay.
-pub(super) fn follow<C: Deref<Target = ClosestPoint>>(
-    tracker: &mut Option<ClosestTracker<C>>,
-    edge_mm: f64,
-) -> impl FnMut(&[[f64; 3]], &mut [[f64; 3]]) {
-    move |x, targets| {
-        if let Some(tracker) = tracker {
-            for (i, (x, target)) in x.iter().zip(targets).enumerate() {
-                let found = tracker.query(i, Point3::from(*x) * edge_mm);
-                *target = (found.point / edge_mm).into();
-            }
-        }
     }
 }
 
