@@ -150,8 +150,12 @@ fn preview_iteration() {
             weight *= 1.1;
             preview.set_weight(weight).expect("a definite matrix");
         });
-        let first = timed(1, || preview.iterate());
-        let [iteration, slowest] = spread(ROUNDS, || preview.iterate());
+        let first = timed(1, || {
+            preview.iterate();
+        });
+        let [iteration, slowest] = spread(ROUNDS, || {
+            preview.iterate();
+        });
         let (rows, entries) = preview.factor_size();
         println!(
             "  {closeness:?}, window {window}: iteration {iteration:.2} (slowest {slowest:.2}) = {:.2} × numeric; first {first:.2}, setup {setup:.1}, new weight {refactor:.2}; factor of {rows} rows, {entries} entries; {} plain",

@@ -1,8 +1,9 @@
 //! Stage 4: the lifted linkage becomes exact: rigid triangles, no overlap, hinges within σ, on the surface.
 //!
 //! [`rationalize`] runs one of two solvers from the opened lift: [`Solver::Exact`] (all conditions to rounding) or
-//! [`Solver::Projection`] (the paper's, for preview and comparison). [`Quality`] measures the result independently of
-//! either.
+//! [`Solver::Projection`] (the paper's, for preview and comparison; [`AlternatingProjection`] step by step).
+//! [`Quality`] measures the result independently of either. A [`Session`] poses a linkage by handles, frame by frame;
+//! [`pose`] reads poses from a file.
 
 mod exact;
 mod grid;

@@ -265,7 +265,7 @@ impl Pose {
                 .handles
                 .iter()
                 .map(|&(point, goal, hold)| {
-                    let from = session.position(point);
+                    let from = session.position(point).unwrap_or(start[point.index()]);
                     let to = match goal {
                         Goal::To(place) => place,
                         Goal::By(way) => from + way,
@@ -583,7 +583,7 @@ by_mm = [0.0, 0.0, 1.0]
         let crown = pose.keyframes[0].handles[0].0;
         let session = pose
             .play(&linkage, &start, None, &Silent, |s| {
-                heights.push(s.position(crown).z)
+                heights.push(s.position(crown).unwrap().z)
             })
             .unwrap();
         assert_eq!(heights.len(), 11 + 21);

@@ -1,9 +1,9 @@
 //! Interactive posing: a linkage that stays a linkage while points of it are dragged (paper, §5, Fig. 16).
 //!
 //! A [`Session`] holds points, factor and history between frames. [`Session::apply`] takes edits, all or none;
-//! [`Session::step`] runs one iteration and is meant to be called once a frame. With a target surface it is the
-//! preview of [`super::projection`]; without one, handles take the place of closeness, and a smoothness term spreads
-//! what they ask for. Conditions (5), (6) and the bound σ hold as well, as projections of a hinge's four edge vectors:
+//! [`Session::step`] runs one iteration and is meant to be called once a frame. With a target surface it iterates as
+//! [`super::AlternatingProjection`] does; without one, handles take the place of closeness, and a smoothness term
+//! spreads what they ask for. Conditions (5), (6) and the bound σ hold as well, as projections of a hinge's four edge vectors:
 //! λ ≤ σ bounds the length of one linear function of them.
 //!
 //! **Smoothness.** Bouaziz et al. (2012) make the Laplacian of the positions small. Here it is that of the triangles'
@@ -130,7 +130,7 @@ pub struct Step {
     pub energy: f64,
     /// Farthest that a point moved, millimetres.
     pub moved_mm: f64,
-    /// Nothing lowers the energy any more: until the next edit further steps are idle.
+    /// Nothing lowers the energy any more: until the next edit steps do nothing and take no time.
     pub settled: bool,
 }
 
@@ -153,6 +153,8 @@ pub struct Session {
     stale_energy: bool,
     /// The places on the target are not those of the points.
     stale_places: bool,
+    /// Nothing was left to do after the last step.
+    settled: bool,
 }
 
 impl Session {
@@ -178,6 +180,7 @@ impl Session {
             stale_matrix: true,
             stale_energy: true,
             stale_places: false,
+            settled: false,
         })
     }
 
@@ -212,8 +215,7 @@ impl Session {
                     )
                 }
                 Edit::Pin(point) => {
-                    self.check_point(*point)?;
-                    let place_mm = self.position(*point);
+                    let place_mm = self.position(*point).ok_or(self.no_such_point(*point))?;
                     (
                         point,
                         Held {
@@ -288,7 +290,7 @@ impl Session {
             held.iter().map(|(p, h)| (*p, h.hold)).collect()
         };
         self.stale_matrix |= weights(&self.held) != weights(&held);
-        self.stale_energy = true;
+        (self.stale_energy, self.settled) = (true, false);
         self.stale_places |= self.follower.is_some() && !places.is_empty();
         self.held = held;
         self.put();
@@ -319,6 +321,13 @@ impl Session {
     /// # Errors
     /// [`RationalizeError::Factor`]: the weights given are so far apart that the matrix is singular to rounding.
     pub fn step(&mut self) -> Result<Step, RationalizeError> {
+        if self.settled {
+            return Ok(Step {
+                energy: self.kernel.energy(),
+                moved_mm: 0.0,
+                settled: true,
+            });
+        }
         if self.stale_matrix {
             self.kernel.refactor()?;
             self.stale_matrix = false;
@@ -336,11 +345,11 @@ impl Session {
             self.kernel.restart(&mut |_, _| {});
         }
         (self.stale_energy, self.stale_places) = (false, false);
-        let outcome = self.kernel.iterate(&mut track);
+        self.settled = self.kernel.iterate(&mut track) == Outcome::Settled;
         Ok(Step {
             energy: self.kernel.energy(),
             moved_mm: self.kernel.moved() * self.edge_mm,
-            settled: outcome == Outcome::Settled,
+            settled: self.settled,
         })
     }
 
@@ -357,14 +366,11 @@ impl Session {
         positions
     }
 
-    /// Where one point is, millimetres.
-    ///
-    /// # Panics
-    /// If there is no such point.
-    pub fn position(&self, point: PointId) -> Point3<f64> {
+    /// Where one point is, millimetres; `None` if there is no such point.
+    pub fn position(&self, point: PointId) -> Option<Point3<f64>> {
         match self.held.get(&point.0) {
-            Some(held) if held.hold == Hold::Hard => held.place_mm,
-            _ => Point3::from(self.kernel.position(point.0) * self.edge_mm),
+            Some(held) if held.hold == Hold::Hard => Some(held.place_mm),
+            _ => Some(Point3::from(self.kernel.position(point.0)? * self.edge_mm)),
         }
     }
 
@@ -381,14 +387,18 @@ impl Session {
         self.kernel.factorizations()
     }
 
+    fn no_such_point(&self, point: PointId) -> EditError {
+        EditError::NoSuchPoint {
+            point,
+            points: self.problem.points,
+        }
+    }
+
     fn check_point(&self, point: PointId) -> Result<(), EditError> {
         if point.index() < self.problem.points {
             Ok(())
         } else {
-            Err(EditError::NoSuchPoint {
-                point,
-                points: self.problem.points,
-            })
+            Err(self.no_such_point(point))
         }
     }
 

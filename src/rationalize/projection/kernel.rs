@@ -570,9 +570,9 @@ impl Kernel {
         &self.place
     }
 
-    /// Where a point of the linkage is.
-    pub fn position(&self, point: u32) -> Vector3<f64> {
-        at(&self.x, self.place[point as usize])
+    /// Where a point of the linkage is; `None` if there is no such point.
+    pub fn position(&self, point: u32) -> Option<Vector3<f64>> {
+        Some(at(&self.x, *self.place.get(point as usize)?))
     }
 
     /// Positions by point of the linkage.
