@@ -9,7 +9,7 @@ use std::ops::Deref;
 
 use nalgebra::Point3;
 
-use super::{Candidate, Closest, ClosestPoint, DEPTH};
+use super::{Candidate, Closest, ClosestPoint, DEPTH, SLACK};
 
 /// Faces in a list at the most. If more are in reach, the ball shrinks until they are not.
 const FACES: usize = 12;
@@ -29,6 +29,9 @@ const FIRST: f64 = 0.2;
 /// Part of the size of the surface (and of the distance from its middle) by which a ball is smaller than it might be:
 /// many times the rounding of a distance.
 const ROUNDING: f64 = 1e-12;
+
+/// Likewise, as a part of the distance.
+const RELATIVE: f64 = 1e-9;
 
 #[derive(Clone, Copy)]
 struct Ball {
@@ -117,9 +120,9 @@ impl<C: Deref<Target = ClosestPoint>> ClosestTracker<C> {
         for near in list {
             if let Some(best) = &best {
                 // They stand in ascending distance from the centre, from which the point moved by no more than this.
-                let least = f64::from(near.distance) - moved * (1.0 + 1e-9);
+                let least = f64::from(near.distance) - moved * (1.0 + RELATIVE);
                 if least > 0.0
-                    && least * least * (1.0 - 1e-9)
+                    && least * least * (1.0 - RELATIVE)
                         > best.hit.squared + ROUNDING * self.size * self.size
                 {
                     break;
@@ -144,8 +147,6 @@ impl<C: Deref<Target = ClosestPoint>> ClosestTracker<C> {
     fn renew(&mut self, point: usize, p: Point3<f64>, moved: f64) -> Closest {
         self.asked += 1;
         let ball = &mut self.balls[point];
-        let best = self.closest.search(&p, ball.hint);
-        let distance = best.hit.squared.sqrt();
         let wanted = if ball.age == 0 && ball.radius < 0.0 && ball.count == 0 {
             // Nothing is known of its movement yet.
             FIRST * self.edge
@@ -156,12 +157,15 @@ impl<C: Deref<Target = ClosestPoint>> ClosestTracker<C> {
             let steps = STEPS[0] + (STEPS[1] - STEPS[0]) * part;
             (steps * step).clamp(SMALLEST * self.edge, LARGEST * self.edge)
         };
-        let slack = ROUNDING * (self.size + (p - self.middle).norm()) + 1e-9 * distance;
-        let mut list = Shortlist::new(distance + 2.0 * wanted + slack);
+        let slack = ROUNDING * (self.size + (p - self.middle).norm());
+        let hint = self.closest.candidate(&p, ball.hint);
+        let mut list = Shortlist::new(hint, 2.0 * wanted + slack);
         self.closest.gather(&p, &mut list);
-        // What is not in the list is at least as far as `list.limit`.
-        let radius = wanted.min(0.5 * (list.limit - distance - slack));
-        let count = list.count.min(FACES);
+        let (best, distance) = (list.best, list.best.hit.squared.sqrt());
+        // What is not in the list is at least as far as its limit.
+        let radius = 0.5 * (list.limit - distance * (1.0 + RELATIVE) - slack);
+        let radius = wanted.min(radius);
+        let count = list.count;
         *ball = Ball {
             centre: p,
             radius: if radius > 0.0 { radius } else { -1.0 },
@@ -179,23 +183,46 @@ impl<C: Deref<Target = ClosestPoint>> ClosestTracker<C> {
     }
 }
 
-/// The nearest triangles found so far, in ascending distance, and one more to know how far the rest is.
+/// The closest triangle found so far, and those not much farther in ascending distance.
 struct Shortlist {
+    best: Candidate,
+    /// What is farther than the closest by this does not belong to the list.
+    reach: f64,
+    /// What is as far as this does not, whatever is still to be found.
+    limit: f64,
+    /// One more than there is room for, to move them.
     found: [(u32, f64); FACES + 1],
     count: usize,
-    limit: f64,
 }
 
 impl Shortlist {
-    fn new(limit: f64) -> Self {
-        Self {
+    /// Empty, but knowing of a triangle that will be met.
+    fn new(hint: Candidate, reach: f64) -> Self {
+        let mut list = Self {
+            best: hint,
+            reach,
+            limit: f64::INFINITY,
             found: [(0, 0.0); FACES + 1],
             count: 0,
-            limit,
-        }
+        };
+        list.tighten(hint.hit.squared.sqrt());
+        list
     }
 
-    fn offer(&mut self, slot: u32, distance: f64) {
+    fn tighten(&mut self, distance: f64) {
+        self.limit = self.limit.min(distance * (1.0 + RELATIVE) + self.reach);
+    }
+
+    /// Whether something at this squared distance matters: to the list, or because it may be the closest.
+    #[inline]
+    fn wants(&self, squared: f64) -> bool {
+        squared < self.limit * self.limit || squared <= self.best.hit.squared * (1.0 + SLACK)
+    }
+
+    fn offer(&mut self, candidate: Candidate) {
+        let distance = candidate.hit.squared.sqrt();
+        self.best = self.best.or(candidate);
+        self.tighten(distance);
         if distance >= self.limit {
             return;
         }
@@ -204,40 +231,51 @@ impl Shortlist {
             self.found[at] = self.found[at - 1];
             at -= 1;
         }
-        self.found[at] = (slot, distance);
-        self.count += 1;
-        if self.count > FACES {
-            // The last only tells where the list ends.
-            self.count = FACES;
-            self.limit = self.found[FACES].1;
+        self.found[at] = (candidate.slot, distance);
+        if self.count < FACES {
+            self.count += 1;
+        } else {
+            self.limit = self.limit.min(self.found[FACES].1);
         }
     }
 }
 
 impl ClosestPoint {
-    /// Offers every triangle nearer than the limit of the list.
+    /// Offers every triangle that the list may want, nearer boxes first.
     fn gather(&self, p: &Point3<f64>, list: &mut Shortlist) {
-        let mut stack = [0u32; DEPTH];
+        let mut stack = [(0u32, 0.0f64); DEPTH];
         let mut depth = 1;
         while depth > 0 {
             depth -= 1;
-            let mut here = stack[depth] as usize;
+            let (node, bound) = stack[depth];
+            if !list.wants(bound) {
+                continue;
+            }
+            let mut here = node as usize;
             loop {
                 let node = &self.nodes[here];
-                if node.distance_squared(p) >= list.limit * list.limit {
-                    break;
-                }
                 if node.count > 0 {
                     for slot in node.at..node.at + node.count {
-                        list.offer(slot, self.candidate(p, slot).hit.squared.sqrt());
+                        list.offer(self.candidate(p, slot));
                     }
                     break;
                 }
-                if depth < DEPTH {
-                    stack[depth] = node.at;
+                let (left, right) = (here + 1, node.at as usize);
+                let to_left = self.nodes[left].distance_squared(p);
+                let to_right = self.nodes[right].distance_squared(p);
+                let (near, far) = if to_left <= to_right {
+                    ((left, to_left), (right, to_right))
+                } else {
+                    ((right, to_right), (left, to_left))
+                };
+                if depth < DEPTH && list.wants(far.1) {
+                    stack[depth] = (far.0 as u32, far.1);
                     depth += 1;
                 }
-                here += 1;
+                if !list.wants(near.1) {
+                    break;
+                }
+                here = near.0;
             }
         }
     }
@@ -306,6 +344,21 @@ mod tests {
         }
         let all = (rounds * points.len()) as u64;
         assert!(tracker.asked() * 10 < all, "{} of {all}", tracker.asked());
+    }
+
+    /// More faces at exactly the same distance than a list holds.
+    #[test]
+    fn around_the_middle_of_a_sphere_the_tree_is_asked() {
+        let surface = Sample::parse("octasphere:faces=800")
+            .unwrap()
+            .generate()
+            .unwrap();
+        let tree = ClosestPoint::new(&surface);
+        let mut tracker = ClosestTracker::new(&tree, 1);
+        for n in 0..60 {
+            let p = Point3::new(0.0, 0.0, 0.05 * f64::from((n % 7) * (n % 3)));
+            assert_eq!(tracker.query(0, p), tree.query(p));
+        }
     }
 
     #[test]
