@@ -28,7 +28,7 @@ use super::RationalizeError;
 use super::problem::{CONDITIONS, Problem, hinge_violations};
 use crate::base::progress::Progress;
 use crate::base::sparse::FactorError;
-use crate::mesh::{ClosestPoint, FaceId};
+use crate::mesh::{ClosestPoint, ClosestTracker};
 
 /// What a solver did.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -162,7 +162,8 @@ struct Solver<'a> {
     trial: Vec<Vector3<f64>>,
     /// Where the stage began.
     begin: Vec<Vector3<f64>>,
-    faces: Vec<FaceId>,
+    /// Closest points, where the target is a surface.
+    tracker: Option<ClosestTracker<&'a ClosestPoint>>,
     /// What draws `x`, and `trial`.
     draws: Vec<Draw>,
     trial_draws: Vec<Draw>,
@@ -188,9 +189,9 @@ impl<'a> Solver<'a> {
             .map(|h| slack(problem, &h.map(|i| x[i as usize])) < NEAR)
             .collect();
         let system = System::new(problem, &near, &[])?;
-        let faces = match target {
-            Target::Surface(closest) => start.iter().map(|p| closest.query(*p).face).collect(),
-            Target::Places(_) => Vec::new(),
+        let tracker = match target {
+            Target::Surface(closest) => Some(ClosestTracker::new(closest, x.len())),
+            Target::Places(_) => None,
         };
         let none = Draw {
             along: Vector3::zeros(),
@@ -203,7 +204,7 @@ impl<'a> Solver<'a> {
             edge_mm,
             trial: x.clone(),
             begin: x.clone(),
-            faces,
+            tracker,
             draws: vec![none; x.len()],
             trial_draws: vec![none; x.len()],
             near,
@@ -256,10 +257,12 @@ impl<'a> Solver<'a> {
         let edge_mm = self.edge_mm;
         match self.target {
             Target::Surface(closest) => {
-                let points = self.trial.iter().zip(&mut self.faces);
-                for ((x, face), draw) in points.zip(&mut self.trial_draws) {
-                    let found = closest.query_from(Point3::from(x * edge_mm), *face);
-                    *face = found.face;
+                let Some(tracker) = &mut self.tracker else {
+                    return;
+                };
+                let draws = self.trial_draws.iter_mut().enumerate();
+                for (x, (point, draw)) in self.trial.iter().zip(draws) {
+                    let found = tracker.query(point, Point3::from(x * edge_mm));
                     let offset = x - found.point.coords / edge_mm;
                     let distance = offset.norm();
                     // On the surface the direction to it is lost in rounding; its normal is the limit.
