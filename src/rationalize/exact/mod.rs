@@ -102,6 +102,10 @@ const LAST_STEPS: usize = 16;
 const GAIN: f64 = 0.02;
 /// Rounds of parting triangles that cross.
 const PARTINGS: usize = 6;
+/// Tried only where there is not more than one crossing for so many triangles: if there are, they are no accident.
+const FEW: usize = 50;
+/// How much farther from the target the worst point may come by it, in L.
+const WORTH: f64 = 0.05;
 /// The stage that the solve goes back to in each of them.
 const RESUME: usize = 2;
 /// In the last stage a factor serves again after a step that left less than this part of the energy.
@@ -224,18 +228,25 @@ impl<'a> Solver<'a> {
         self.x.iter().map(mm).collect()
     }
 
-    /// Parts triangles that cross though no hinge joins them; where that cannot be done, the fewest crossings that were
-    /// found stay.
+    /// Parts triangles that cross though no hinge joins them. Where that fails, or would cost more than it is worth,
+    /// everything stays as it is.
     fn part(&mut self, progress: &dyn Progress) -> Result<(), RationalizeError> {
-        let mut least = None;
+        let before = self.x.clone();
+        let allowed = self.farthest() + WORTH;
+        let mut most = self.problem.triangles.len() / FEW;
         for _ in 0..PARTINGS {
             let found = contacts(self.problem, &self.x);
-            if least.as_ref().is_none_or(|(n, _)| found.len() < *n) {
-                least = Some((found.len(), self.x.clone()));
+            let pairs = found.len() / 3;
+            if pairs == 0 {
+                if self.violation() > EXACT.sqrt() || self.farthest() > allowed {
+                    break;
+                }
+                return Ok(());
             }
-            if found.is_empty() {
+            if pairs > most {
                 break;
             }
+            most = pairs;
             self.contacts.extend(found);
             self.system = System::new(self.problem, &self.near, &self.contacts)?;
             self.effort.analyses += 1;
@@ -244,12 +255,14 @@ impl<'a> Solver<'a> {
             }
             self.run(&LAST, LAST_STEPS, progress)?;
         }
-        if let Some((n, x)) = least
-            && n < contacts(self.problem, &self.x).len()
-        {
-            self.x = x;
-        }
+        self.x = before;
         Ok(())
+    }
+
+    /// The longest way from a point to its target, in L.
+    fn farthest(&self) -> f64 {
+        let distances = self.draws.iter().map(|d| d.distance.abs());
+        distances.fold(0.0, f64::max)
     }
 
     /// What draws the points of `trial`, into `trial_draws`.
