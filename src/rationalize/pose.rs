@@ -33,9 +33,9 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 use serde::Deserialize;
 
-use super::RationalizeError;
 use super::projection::Rest;
 use super::session::{Edit, EditError, Hold, Session};
+use super::{Effort, RationalizeError};
 use crate::base::document::{Complaint, Document, DocumentError, ranged};
 use crate::base::ids::Id as _;
 use crate::base::progress::Progress;
@@ -223,6 +223,11 @@ impl Pose {
         Ok(resolved)
     }
 
+    /// The bound on the scale factors that the file gives.
+    pub fn sigma(&self) -> Option<f64> {
+        self.file.sigma
+    }
+
     /// Plays all keyframes from `start`, drawn to `target` by a weight if there is one, and hands the positions
     /// (millimetres) after every move to `frame`. What comes back stands at the last keyframe, near to exact.
     ///
@@ -304,7 +309,32 @@ impl Pose {
         }
         Ok(session)
     }
+
+    /// Plays all keyframes as [`Pose::play`] does, then moves every point to the nearest place where edges and conditions
+    /// hold to rounding, hard handles and pins exactly where they are. Positions in millimetres, by point, and what that
+    /// took.
+    ///
+    /// # Errors
+    /// [`PoseError`], as [`Pose::play`].
+    pub fn exact(
+        &self,
+        linkage: &Linkage,
+        start: &[Point3<f64>],
+        target: Option<(Arc<ClosestPoint>, f64)>,
+        progress: &dyn Progress,
+    ) -> Result<(Vec<Point3<f64>>, Effort), PoseError> {
+        let session = self.play(linkage, start, target, progress, |_| {})?;
+        let played = session.positions();
+        let pinned: Vec<_> = session.held().map(|(point, _)| point).collect();
+        let places: Vec<_> = played.iter().map(|p| (*p, 1.0)).collect();
+        let sigma = self.file.sigma.unwrap_or(NO_BOUND);
+        let settled = super::settle(linkage, &played, &places, &pinned, sigma, progress)?;
+        Ok(settled)
+    }
 }
+
+/// σ where there is none: hinges stop at 180° by themselves.
+const NO_BOUND: f64 = 2.0;
 
 /// Weight of a hard handle on its way.
 const ON_THE_WAY: f64 = 100.0;
