@@ -52,7 +52,7 @@ pub fn explore(
     // No sheet is cut here, so that it is all one where a seam would run.
     let guide = SeamGuide::new(surface);
     let mut found = loop {
-        let ground = Arc::new(Ground::new(surface, &darts, &guide).map_err(MakeError::Conformal)?);
+        let ground = Arc::new(Ground::new(surface, &darts, &guide, &[])?);
         match mapped(request, &loaded, &ground, sigma, propose, progress) {
             Err(MakeError::Conformal(
                 error @ (ConformalError::Holonomy { .. } | ConformalError::TotalCurvature { .. }),
@@ -166,6 +166,7 @@ impl Explored {
             removed: map.removal,
             left_out: &[],
             orientation_deg: laid.orientation_deg,
+            shares: &[1.0],
         };
         Ok(decided(request, folder, &self.loaded, &taken, &stock))
     }
