@@ -31,7 +31,7 @@ pub struct Explored {
 }
 
 /// Maps the surface of `request`. With cones left to the program this is the map without any, unless it is asked to
-/// `propose`, or none is possible without.
+/// `propose`, or none is possible without. Further surfaces are not looked at.
 ///
 /// # Errors
 /// [`MakeError`] for input that cannot be used, a map that does not exist, or an interruption.
@@ -40,6 +40,12 @@ pub fn explore(
     propose: bool,
     progress: &dyn Progress,
 ) -> Result<Explored, MakeError> {
+    // A map is one of the first surface.
+    let request = &Request {
+        also: Vec::new(),
+        shares: None,
+        ..request.clone()
+    };
     let material = crate::material::load(&request.material).map_err(MakeError::Material)?;
     let sigma = checked_sigma(request.sigma.unwrap_or(material.sigma.max))?;
     check_sizing(request.sizing)?;

@@ -5,6 +5,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::MakeError;
 use super::design::{ConeChoice, CutChoice, DartChoice};
+use super::make::title;
 use super::request::{ConePlace, ConeWish, DartWish, Request, Source};
 use super::targets::{Target, Targets, check_match, follow};
 use crate::conformal::{Cone, Dart, vertex_from_number};
@@ -40,7 +41,7 @@ pub(crate) struct Also {
     /// What a person calls it.
     pub name: String,
     /// The surface.
-    pub surface: Surface,
+    pub import: Import,
     /// SHA-256 of the mesh file, hexadecimal.
     pub sha256: Option<String>,
 }
@@ -49,11 +50,11 @@ pub(crate) struct Also {
 pub(crate) const MOST_SURFACES: usize = 9;
 
 impl Loaded {
-    /// All surfaces that the pattern is to fit; `name` is what the first is called.
-    pub fn targets(&self, name: String) -> Targets {
-        let first = Target::new(name, self.import.surface.clone());
+    /// All surfaces that the pattern is to fit; `source` is that of the first.
+    pub fn targets(&self, source: &Source) -> Targets {
+        let first = Target::new(title(source), self.import.surface.clone());
         let further = self.also.iter();
-        let further = further.map(|also| Target::new(also.name.clone(), also.surface.clone()));
+        let further = further.map(|a| Target::new(a.name.clone(), a.import.surface.clone()));
         Targets(std::iter::once(first).chain(further).collect())
     }
 }
@@ -92,7 +93,7 @@ fn read(source: &Source, options: &ImportOptions) -> Result<(Import, Option<Stri
     }
 }
 
-/// What a person calls a source.
+/// A source as it was given.
 fn named(source: &Source) -> String {
     match source {
         Source::Sample(text) => format!("sample:{}", text.trim_start_matches("sample:")),
@@ -118,20 +119,31 @@ fn read_also(request: &Request, first: &Import) -> Result<Vec<Also>, MakeError> 
         },
         ..request.import
     };
-    let further = |source: &Source| {
+    let titles: Vec<String> = std::iter::once(&request.source)
+        .chain(&request.also)
+        .map(title)
+        .collect();
+    let further = |(n, source): (usize, &Source)| {
         let (import, sha256) = read(source, &options)?;
-        let name = named(source);
         check_match(
             (&named(&request.source), &first.surface),
-            (&name, &import.surface),
+            (&named(source), &import.surface),
         )?;
+        // Files of one name in several folders are told apart by their numbers.
+        let number = n + 2;
+        let name = &titles[n + 1];
+        let taken = titles[..=n].contains(name);
         Ok(Also {
-            name,
-            surface: import.surface,
+            name: if taken {
+                format!("{name} ({number})")
+            } else {
+                name.clone()
+            },
+            import,
             sha256,
         })
     };
-    request.also.iter().map(further).collect()
+    request.also.iter().enumerate().map(further).collect()
 }
 
 /// Reads the surface, checks its hash, and turns the cones asked for into vertices.
@@ -178,7 +190,8 @@ pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
     }
     if let Some(before) = before {
         for further in &mut also {
-            further.surface = follow(&further.surface, &before, &import.surface)?;
+            let shape = &mut further.import.surface;
+            *shape = follow(shape, &before, &import.surface)?;
         }
     }
     let (mut cuts, mut cut_choices) = (Vec::new(), Vec::new());

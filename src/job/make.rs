@@ -107,7 +107,8 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     progress.start("reading the surface", None);
     let loaded = load(request)?;
     let surface = &loaded.import.surface;
-    let targets = loaded.targets(title(&request.source));
+    let targets = loaded.targets(&request.source);
+    targets.check_sizes(stock.sigma)?;
     let mut shape = choose(request, &loaded, &stock, &targets, progress)?;
     let warnings = tell::warnings(&loaded, &material, &shape, stock.sigma);
 

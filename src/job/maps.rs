@@ -62,6 +62,15 @@ impl Ground {
     }
 }
 
+impl Ground {
+    /// The surface that a person is told of: the first target, with the vertices of the one that is mapped.
+    pub fn shown(&self) -> &Surface {
+        self.shapes
+            .first()
+            .map_or(&self.surface, |shape| &shape.surface)
+    }
+}
+
 /// A map with the options that made it and the number of triangles to remove.
 pub(crate) struct Map {
     pub ground: Arc<Ground>,

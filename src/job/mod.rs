@@ -74,6 +74,20 @@ pub enum MakeError {
         /// What is different, in words.
         difference: String,
     },
+    /// Surfaces of sizes that no one sheet has.
+    #[error(
+        "{larger} is {factor:.2} times as large as {smaller} on half of its area, and a sheet of σ = {sigma} cannot be both: σ must be larger, or the files brought nearer to one size"
+    )]
+    SizesApart {
+        /// The larger surface.
+        larger: String,
+        /// The smaller one.
+        smaller: String,
+        /// By what lengths differ.
+        factor: f64,
+        /// The largest stretch.
+        sigma: f64,
+    },
     /// More surfaces than there are names for their files.
     #[error("{count} surfaces were asked for; one pattern can be fitted to {most} at the most")]
     TooManySurfaces {

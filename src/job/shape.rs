@@ -84,6 +84,9 @@ const MENDED: usize = 4;
 const MOST_SLOTS: usize = 8;
 /// Part of all triangles that may be left out like this.
 const MOST_LEFT_OUT: f64 = 0.015;
+/// The same where one sheet is to fit several surfaces: their outlines are no conformal images of each other, so that
+/// what hangs over the rim of one or the other goes. How much of each is covered is judged in any case.
+const MOST_LEFT_OUT_OF_SEVERAL: f64 = 0.05;
 
 /// Lays a linkage on a map, solves and judges it; where it fails by a few triangles only, it is made once more without
 /// them.
@@ -115,7 +118,12 @@ pub(crate) fn attempt(
     if first.verdict.pass || request.left_out.is_some() {
         return Ok(first);
     }
-    let most = (MOST_LEFT_OUT * whole as f64) as usize;
+    let part = if targets.several() {
+        MOST_LEFT_OUT_OF_SEVERAL
+    } else {
+        MOST_LEFT_OUT
+    };
+    let most = (part * whole as f64) as usize;
     let mut failing = first.failing(request, stock, targets);
     for _ in 0..MENDED {
         left_out.extend(&failing);

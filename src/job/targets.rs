@@ -43,6 +43,29 @@ impl Targets {
         self.0.len() > 1
     }
 
+    /// Refuses surfaces so far apart in size that no sheet takes both shapes.
+    ///
+    /// # Errors
+    /// [`MakeError::SizesApart`].
+    pub fn check_sizes(&self, sigma: f64) -> Result<(), MakeError> {
+        for (i, a) in self.0.iter().enumerate() {
+            for b in &self.0[i + 1..] {
+                let factor = middle_factor(&a.surface, &b.surface);
+                let (larger, smaller) = if factor < 1.0 { (a, b) } else { (b, a) };
+                let factor = factor.max(1.0 / factor);
+                if factor > sigma {
+                    return Err(MakeError::SizesApart {
+                        larger: larger.name.clone(),
+                        smaller: smaller.name.clone(),
+                        factor,
+                        sigma,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// The shares of the targets in the surfaces that a pattern may be laid on, the most promising first: their mean,
     /// then each of them; the first alone where all are of one shape.
     pub fn patterns(&self) -> Vec<Vec<f64>> {
@@ -233,6 +256,27 @@ impl Shaped {
     }
 }
 
+/// The factor by which lengths grow from one surface to another of the same mesh, on half of the area more.
+fn middle_factor(from: &Surface, to: &Surface) -> f64 {
+    let mut factors: Vec<(f64, f64)> = from
+        .faces()
+        .ids()
+        .map(|face| {
+            let (a, b) = (from.face_area(face), to.face_area(face));
+            let (a, b) = (a.max(f64::MIN_POSITIVE), b.max(f64::MIN_POSITIVE));
+            ((b / a).sqrt(), (a * b).sqrt())
+        })
+        .collect();
+    factors.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * factors.iter().map(|f| f.1).sum::<f64>();
+    let mut sum = 0.0;
+    let middle = factors.iter().find(|f| {
+        sum += f.1;
+        sum >= half
+    });
+    middle.map_or(1.0, |f| f.0)
+}
+
 /// Over all shapes; none if there is one only.
 pub(crate) fn spread(shapes: &[Shaped]) -> Option<Spread> {
     let first = shapes.first().filter(|_| shapes.len() > 1)?;
@@ -248,4 +292,123 @@ fn areas(surface: &Surface) -> Per<VertexId, f64> {
         corners.iter().for_each(|&v| areas[v] += area);
     }
     areas
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Rotation3;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::base::progress::Silent;
+    use crate::conformal::{FlattenOptions, Flattened, MetricSolver, Singularities, Sizing};
+    use crate::mesh::{FaceId, Sample, insert_point};
+
+    fn cap() -> Surface {
+        Sample::parse("cap:faces=400").unwrap().generate().unwrap()
+    }
+
+    fn moved(surface: &Surface, how: impl Fn(Point3<f64>) -> Point3<f64>) -> Surface {
+        let (positions, faces) = surface.to_arrays();
+        Surface::new(positions.into_iter().map(how).collect(), faces).unwrap()
+    }
+
+    fn targets(surfaces: &[&Surface]) -> Targets {
+        let target = |s: &&Surface| Target::new("s".into(), (*s).clone());
+        Targets(surfaces.iter().map(target).collect())
+    }
+
+    proptest! {
+        /// Where two shapes are congruent their mean is the shape, wherever they lie, and there is one pattern to try.
+        #[test]
+        fn the_mean_of_congruent_surfaces_is_congruent(
+            turn in proptest::array::uniform3(-3.0..3.0f64),
+            shift in proptest::array::uniform3(-500.0..500.0f64),
+            share in 0.1..0.9f64,
+        ) {
+            let cap = cap();
+            let turn = Rotation3::new(turn.into());
+            let other = moved(&cap, |p| turn * p + Vector3::from(shift));
+            let both = targets(&[&cap, &other]);
+            let mean = both.mixed(&[share, 1.0 - share]).unwrap();
+            for (a, b) in mean.positions().iter().zip(cap.positions().iter()) {
+                prop_assert!((a - b).norm() < 1e-9);
+            }
+            prop_assert_eq!(both.patterns(), vec![vec![1.0, 0.0]]);
+        }
+
+        /// The mean of two sizes is the size between; a mirror image is not taken for the shape itself.
+        #[test]
+        fn sizes_are_mixed_and_mirror_images_are_other_shapes(factor in 0.5..2.0f64) {
+            let cap = cap();
+            let larger = moved(&cap, |p| p * factor);
+            let mean = targets(&[&cap, &larger]).mixed(&[0.5, 0.5]).unwrap();
+            let wanted = 0.25 * (1.0 + factor) * (1.0 + factor);
+            prop_assert!((mean.area() / cap.area() / wanted - 1.0).abs() < 1e-9);
+            let shaped = Shaped::new(&larger, &cap).unwrap();
+            for log in shaped.log_factor.iter() {
+                prop_assert!((log - factor.ln()).abs() < 1e-9);
+            }
+            let lopsided = moved(&cap, |p| Point3::new(p.x + 0.3 * p.y, p.y, p.z + 0.1 * p.x));
+            let mirrored = moved(&lopsided, |p| Point3::new(-p.x, p.y, p.z));
+            prop_assert_eq!(targets(&[&lopsided, &mirrored]).patterns().len(), 3);
+        }
+
+        /// λ of every shape lies in [1, σ] wherever σ has room for all of them, and the sheet is as large as it may be.
+        #[test]
+        fn the_window_holds_for_all_shapes(factors in proptest::array::uniform2(0.7..1.1f64)) {
+            let cap = cap();
+            let shapes: Vec<Shaped> = factors
+                .iter()
+                .map(|f| Shaped::new(&moved(&cap, |p| p * *f), &cap).unwrap())
+                .collect();
+            let mut solver = MetricSolver::new(&cap).unwrap().among(spread(&shapes));
+            let options = FlattenOptions {
+                sigma: 2.0,
+                sizing: Sizing::EdgeMm(10.0),
+                cone_clearance: 0.7,
+            };
+            let none = Singularities::none(&cap);
+            let flat = Flattened::solve(&mut solver, &none, &options, &Silent).unwrap();
+            let own = flat.layout.log_scale.iter().map(|x| x.exp());
+            let least = own.clone().fold(f64::INFINITY, f64::min);
+            let most = own.fold(0.0, f64::max);
+            let [small, large] = [factors[0].min(factors[1]), factors[0].max(factors[1])];
+            prop_assume!(most * large / (least * small) < 1.9);
+            prop_assert!((least * small / flat.floor - 1.0).abs() < 1e-9);
+            prop_assert!((flat.scale.min / (least * small) - 1.0).abs() < 1e-9);
+            prop_assert!((flat.scale.max / (most * large) - 1.0).abs() < 1e-9);
+            prop_assert!(flat.scale.max <= 2.0 && flat.scale.inside == 1.0);
+        }
+
+        /// A point put into one shape is put into the others at the same weights of the same face.
+        #[test]
+        fn inserted_points_follow(face in 0u32..300, a in 0.2..0.4f64, b in 0.2..0.4f64) {
+            let cap = cap();
+            let shape = moved(&cap, |p| Point3::new(1.3 * p.x, p.y, 0.5 * p.z));
+            let weights = [a, b, 1.0 - a - b];
+            let (after, vertex) = insert_point(&cap, FaceId(face), weights).unwrap();
+            prop_assume!(after.positions().len() > cap.positions().len());
+            let followed = follow(&shape, &cap, &after).unwrap();
+            prop_assert_eq!(followed.faces(), after.faces());
+            // The change of shape is linear, so the image of the point is known.
+            let p = after.position(vertex);
+            let image = Point3::new(1.3 * p.x, p.y, 0.5 * p.z);
+            prop_assert!((followed.position(vertex) - image).norm() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn shares_that_do_not_fit_are_refused() {
+        let cap = cap();
+        let both = targets(&[&cap, &moved(&cap, |p| p * 1.5)]);
+        for shares in [&[1.0][..], &[0.5, 0.6], &[1.5, -0.5], &[f64::NAN, 1.0], &[]] {
+            assert!(matches!(both.mixed(shares), Err(MakeError::Shares { .. })));
+        }
+        assert!(both.check_sizes(1.6).is_ok());
+        assert!(matches!(
+            both.check_sizes(1.4),
+            Err(MakeError::SizesApart { factor, .. }) if (factor - 1.5).abs() < 1e-9
+        ));
+    }
 }

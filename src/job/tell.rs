@@ -31,6 +31,10 @@ pub(crate) fn warnings(
         .into_iter()
         .map(|r| format!("the mesh was mended: {r}"))
         .collect();
+    for also in &loaded.also {
+        let repairs = also.import.report.repairs().into_iter();
+        warnings.extend(repairs.map(|r| format!("the mesh {} was mended: {r}", also.name)));
+    }
     if sigma > material.sigma.max {
         warnings.push(format!(
             "σ = {} was asked for, but the profile {} says {} ({}): hinges are likely to tear. Cut a small trial first",
@@ -124,7 +128,7 @@ fn seams(shape: &Shape) -> String {
 
 /// The open cuts, if there are any: where they are and what they mean.
 fn darts_in_words(ground: &Ground) -> Option<String> {
-    let at = |v: &VertexId| place(ground.surface.position(*v));
+    let at = |v: &VertexId| place(ground.shown().position(*v));
     let each = |dart: &Dart| match (dart.stops.first(), dart.stops.last()) {
         (Some(a), Some(b)) if a != b => format!("from {} to {}", at(a), at(b)),
         (Some(a), _) => format!("around the handle at {}", at(a)),
@@ -252,8 +256,11 @@ pub(crate) fn figures(
     warnings: &[String],
 ) -> Value {
     let (flat, built) = (&shape.flat, &shape.built);
-    let surface = &shape.ground.surface;
-    let mut distortion = flat.layout.quasi_conformal_error(surface).into_vec();
+    let surface = shape.ground.shown();
+    let mut distortion = flat
+        .layout
+        .quasi_conformal_error(&shape.ground.surface)
+        .into_vec();
     distortion.sort_by(f64::total_cmp);
     let at = |part: f64| {
         distortion
@@ -333,7 +340,7 @@ pub(crate) fn figures(
         let further = further.map(|(fit, also)| {
             json!({
                 "surface": also.name,
-                "area_mm2": also.surface.area(),
+                "area_mm2": also.import.surface.area(),
                 "solve": { "steps": fit.effort.steps, "factorizations": fit.effort.factorizations },
                 "quality": fit.quality,
             })
