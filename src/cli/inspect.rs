@@ -1,4 +1,4 @@
-//! `kagome inspect`: what a surface is like, and what had to be mended.
+//! `kagome inspect`: what a surface is like, and what had to be mended. A linkage is told from a surface by its content.
 
 use std::path::PathBuf;
 
@@ -7,10 +7,12 @@ use clap::Args;
 use super::flatten::{form_of, one_line, write};
 use super::layout_args::SizeArgs;
 use super::surface_args::SurfaceArgs;
-use super::{Failure, Global, Terminal, print};
+use super::{Failure, Global, Terminal, inspect_linkage, print};
 use crate::job::{MapFigures, Request, explore};
+use crate::linkage::is_linkage;
 use crate::mesh::Import;
 use crate::mesh::check::Inspection;
+use crate::mesh::units::Unit;
 
 /// Arguments of `kagome inspect`.
 #[derive(Args, Clone, Debug)]
@@ -19,19 +21,43 @@ use crate::mesh::check::Inspection;
   kagome inspect scan.stl --unit in
   kagome inspect statue.ply --size 300 --part largest --json
   kagome inspect sample:torus:t=3
-  kagome inspect scan.obj --size 250 --propose")]
+  kagome inspect scan.obj --size 250 --propose
+  kagome inspect scan-sheet/linkage.obj --sigma 1.6
+  kagome inspect scan-sheet/linkage.obj --motions 4 -o motions.obj")]
 pub struct InspectArgs {
     #[command(flatten)]
-    surface: SurfaceArgs,
+    pub(super) surface: SurfaceArgs,
     /// Also say what stretch it needs without cones, and which cones and turnings would need less
     #[arg(long)]
     propose: bool,
     /// Write the best proposal: a page with pictures (.html), the surface with its layout (.obj), or a design for
-    /// `kagome make` (.toml)
-    #[arg(short, long, value_name = "FILE", requires = "propose")]
-    output: Option<PathBuf>,
+    /// `kagome make` (.toml); with --motions, the linkage at rest and in each motion, as objects of one file (.obj)
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: Option<PathBuf>,
+    /// Of a linkage: also the N softest ways in which it gives way, if its hinges resist turning alike
+    #[arg(long, value_name = "N")]
+    pub(super) motions: Option<usize>,
     #[command(flatten)]
-    size: SizeArgs,
+    pub(super) size: SizeArgs,
+}
+
+impl InspectArgs {
+    /// Those that were given and say nothing of a linkage, by name.
+    pub(super) fn for_surfaces(&self) -> Vec<&'static str> {
+        let surface = &self.surface;
+        let mut given: Vec<&'static str> = [
+            (surface.unit != Unit::default(), "--unit"),
+            (surface.scale != 1.0, "--scale"),
+            (surface.size.is_some(), "--size"),
+            (surface.part.is_some(), "--part"),
+            (self.propose, "--propose"),
+        ]
+        .into_iter()
+        .filter_map(|(given, name)| given.then_some(name))
+        .collect();
+        given.extend(self.size.given().into_iter().filter(|n| *n != "--sigma"));
+        given
+    }
 }
 
 /// Reads a surface and prints its figures.
@@ -39,6 +65,21 @@ pub struct InspectArgs {
 /// # Errors
 /// [`Failure::Bad`] if it is no surface, or cannot be mapped, with what is wrong and what to do.
 pub fn run(args: &InspectArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
+    if !args.surface.surface.starts_with("sample:")
+        && let Ok(bytes) = std::fs::read(&args.surface.surface)
+        && is_linkage(&bytes)
+    {
+        return inspect_linkage::run(&bytes, args, global, terminal);
+    }
+    if args.motions.is_some() {
+        return Err(Failure::Bad(format!(
+            "--motions is for a linkage (linkage.obj), and {} is a surface",
+            args.surface.surface
+        )));
+    }
+    if args.output.is_some() && !args.propose {
+        return Err(Failure::Bad("-o matters only with --propose".into()));
+    }
     if !args.propose && !args.size.given().is_empty() {
         return Err(Failure::Bad(format!(
             "{} matters only with --propose",

@@ -5,6 +5,7 @@
 
 pub mod flatten;
 pub mod inspect;
+mod inspect_linkage;
 pub mod layout_args;
 pub mod machines;
 pub mod make;
@@ -56,7 +57,7 @@ enum Verb {
     Make(Box<make::MakeArgs>),
     /// The conformal map alone: try cones, darts and rims before a sheet is made
     Flatten(Box<flatten::FlattenArgs>),
-    /// Show what a surface is like: topology, size, curvature, defects
+    /// Show what a surface is like (topology, size, curvature, defects), or a linkage.obj (hinges, how it can move)
     Inspect(Box<inspect::InspectArgs>),
     /// List the sample surfaces, or write one as a file
     Samples(samples::SamplesArgs),

@@ -8,6 +8,7 @@ mod choose;
 mod cut;
 mod design;
 mod explore;
+mod linkage_figures;
 mod load;
 mod make;
 mod map_figures;
@@ -27,6 +28,7 @@ pub use design::{
     SurfaceChoice,
 };
 pub use explore::{Explored, explore};
+pub use linkage_figures::LinkageFigures;
 pub use make::{FILES, Made, make};
 pub use map_figures::{ConeFigures, MapFigures};
 pub use request::{

@@ -5,7 +5,7 @@
 //! cuts the seam along lattice lines, places every triangle flat and closed on the sheet, and lifts the linkage, opened
 //! as λ asks, back onto the surface. [`Flaps`] are the rows of triangles that are cut a second time along the seam, to be
 //! glued on.
-//! [`write_obj`] is the format that other programs read.
+//! [`write_obj`] is the format that other programs read, [`read_obj`] takes it back.
 
 mod clip;
 mod continuity;
@@ -17,6 +17,7 @@ mod net;
 mod obj;
 mod orientation;
 mod pieces;
+mod read;
 mod seam;
 mod types;
 mod walk;
@@ -31,6 +32,7 @@ pub use guide::SeamGuide;
 pub use lattice::Lattice;
 pub use lift::opening_turn;
 pub use obj::write_obj;
+pub use read::{LinkageProblem, LinkageReadError, is_linkage, read_obj};
 pub use types::{Cell, Colour, Corner, Handedness, Hinge, Linkage, PointId, Triangle, TriangleId};
 
 use crate::base::progress::{Interrupted, Progress};

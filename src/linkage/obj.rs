@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use nalgebra::Point3;
 
 use super::Linkage;
+use super::read::HEADER;
 use crate::base::ids::Id as _;
 use crate::base::units::fixed;
 
@@ -17,7 +18,10 @@ const DECIMALS: usize = 12;
 /// flat position in millimetres. `positions` holds one entry for each point.
 pub fn write_obj(linkage: &Linkage, positions: &[Point3<f64>]) -> String {
     let mut text = String::with_capacity(positions.len() * 64 + linkage.triangles.len() * 160);
-    text.push_str("# kagome linkage: f = one rigid triangle, v = position in space (mm), vt = closed on the sheet (mm)\n");
+    text.push_str(HEADER);
+    text.push_str(
+        ": f = one rigid triangle, v = position in space (mm), vt = closed on the sheet (mm)\n",
+    );
     for p in positions {
         let _ = writeln!(
             text,

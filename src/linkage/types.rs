@@ -206,6 +206,23 @@ impl Linkage {
         }
     }
 
+    /// A linkage from what it consists of: hinges in the order of their points, `points` of which there are in all.
+    pub(super) fn from_parts(
+        edge_mm: f64,
+        handedness: Handedness,
+        triangles: Per<TriangleId, Triangle>,
+        hinges: Vec<Hinge>,
+        points: usize,
+    ) -> Self {
+        Self {
+            edge_mm,
+            handedness,
+            triangles,
+            hinges,
+            points,
+        }
+    }
+
     /// A planar linkage from lattice cells: (i, j, colour) with corners at (i, j), (i + 1, j), (i, j + 1) for up and
     /// (i + 1, j), (i + 1, j + 1), (i, j + 1) for down, where (i, j) lies at L (i + j/2, j √3/2). For coupons and tests.
     pub fn patch(edge_mm: f64, handedness: Handedness, cells: &[(i32, i32, Colour)]) -> Self {
@@ -288,6 +305,31 @@ impl Linkage {
         self.neighbours_where(|hinge| !hinge.seam)
     }
 
+    /// Lattice vertices with triangles all around, across seams too, by the number of triangles: 6, or fewer or more at a
+    /// cone.
+    pub fn rounds(&self) -> std::collections::BTreeMap<usize, usize> {
+        let neighbours = self.neighbours();
+        let mut seen = Per::filled(self.triangles.len(), [false; 3]);
+        let mut rounds = std::collections::BTreeMap::new();
+        for start in self.triangles.ids() {
+            for corner in 0..3 {
+                let (mut at, mut count) = ((start, corner), 0);
+                while !std::mem::replace(&mut seen[at.0][at.1], true) {
+                    count += 1;
+                    // Over the side that leaves the vertex; beyond, it ends there.
+                    let Some((beyond, side)) = neighbours[at.0][at.1] else {
+                        break;
+                    };
+                    at = (beyond, (side + 1) % 3);
+                    if at == (start, corner) {
+                        *rounds.entry(count).or_insert(0) += 1;
+                    }
+                }
+            }
+        }
+        rounds
+    }
+
     fn neighbours_where(
         &self,
         keep: impl Fn(&Hinge) -> bool,
@@ -317,6 +359,9 @@ mod tests {
                 assert_eq!(linkage.hinges.len() as i32, hinges);
                 assert_eq!(linkage.point_count() as i32, 3 * triangles - hinges);
                 assert!(linkage.hinges.iter().all(|h| !h.seam));
+                let inner = 1 + 3 * radius * (radius - 1);
+                let rounds: Vec<_> = linkage.rounds().into_iter().collect();
+                assert_eq!(rounds, [(6, inner as usize)]);
             }
         }
     }

@@ -2,10 +2,14 @@
 //!
 //! [`rationalize`] runs one of two solvers from the opened lift: [`Solver::Exact`] (all conditions to rounding) or
 //! [`Solver::Projection`] (the paper's, for preview and comparison). [`Quality`] measures the result independently of
-//! either.
+//! either, [`Soundness`] the part of it that needs no surface. [`freedom()`] counts and finds the degrees of freedom that
+//! a linkage has left, [`softest`] the motions that cost least.
 
 mod exact;
+mod freedom;
 mod grid;
+mod motion;
+mod overlap;
 mod problem;
 mod projection;
 mod quality;
@@ -13,8 +17,11 @@ mod quality;
 use nalgebra::{Point3, Vector3};
 
 pub use exact::{Effort, STAGE_COUNT};
+pub use freedom::{Freedom, FreedomError, Mobility, freedom};
+pub use motion::{MOST_MOTIONS, Motion, motions_obj, softest};
+pub use overlap::OVERLAP_TOLERANCE;
 pub use problem::Problem;
-pub use quality::{OVERLAP_TOLERANCE, Quality, SIGMA_TOLERANCE, Worst, failing};
+pub use quality::{Quality, SIGMA_TOLERANCE, Soundness, Worst, failing};
 
 use crate::base::progress::{Interrupted, Progress};
 use crate::base::sparse::FactorError;

@@ -3,13 +3,11 @@
 use nalgebra::{Point3, Vector3};
 
 use super::grid::PointGrid;
+use super::overlap::{OVERLAP_TOLERANCE, centroids, crossing};
 use super::problem::{Condition, Problem, hinge_scale};
 use crate::base::ids::Id as _;
 use crate::linkage::{Linkage, PointId, TriangleId};
 use crate::mesh::{ClosestPoint, Surface, distance_to_triangle};
-
-/// Depth in L below which an overlap is rounding, not an overlap: a hundredth of a kerf even for large triangles.
-pub const OVERLAP_TOLERANCE: f64 = 1e-4;
 
 /// A hinge that opens farther than 180° by more than this (radians) counts as over-opened.
 const OPEN_SLACK: f64 = 1e-3;
@@ -26,6 +24,130 @@ pub struct Worst {
     pub point: u32,
     /// Where it is, millimetres.
     pub at_mm: [f64; 3],
+}
+
+/// What the positions of a linkage tell by themselves, without its surface. Lengths in L unless named otherwise.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Soundness {
+    /// Largest relative error of an edge length.
+    pub edge_error_max: f64,
+    /// Root mean square of the relative edge errors.
+    pub edge_error_rms: f64,
+    /// Hinges whose triangles penetrate each other (conditions 3 and 4).
+    pub penetrations: usize,
+    /// Deepest penetration, in L.
+    pub penetration_depth: Worst,
+    /// Pairs of triangles without a common point that cross in space.
+    pub intersections: usize,
+    /// Where one of those pairs is.
+    pub intersection_at: Option<Worst>,
+    /// Smallest, mean and largest scale factor over the hinges.
+    pub opening: [f64; 3],
+    /// The hinge that is open widest.
+    pub opening_max: Worst,
+    /// Hinges opened past 180°.
+    pub over_open: usize,
+    /// Hinges over σ by more than 10⁻⁴, or opened past 180°.
+    pub over_sigma: usize,
+    /// The bound itself.
+    pub sigma: f64,
+}
+
+impl Soundness {
+    /// Measures `positions` (millimetres, by point) of a linkage whose hinges may open to `sigma`.
+    pub fn measure(linkage: &Linkage, positions: &[Point3<f64>], sigma: f64) -> Self {
+        let problem = Problem::new(linkage, sigma);
+        let x = in_edges(linkage, positions);
+        Self::of(
+            linkage,
+            positions,
+            &problem,
+            &x,
+            &centroids(&problem.triangles, &x),
+        )
+    }
+
+    fn of(
+        linkage: &Linkage,
+        positions: &[Point3<f64>],
+        problem: &Problem,
+        x: &[Vector3<f64>],
+        centroids: &[Vector3<f64>],
+    ) -> Self {
+        let sigma = problem.sigma;
+        let worst = |value: f64, point: usize| worst(positions, value, point);
+        let (mut edge_error_max, mut edge_sum) = (0.0f64, 0.0);
+        for t in &problem.triangles {
+            for k in 0..3 {
+                let error = ((x[t[(k + 1) % 3] as usize] - x[t[k] as usize]).norm() - 1.0).abs();
+                edge_error_max = edge_error_max.max(error);
+                edge_sum += error * error;
+            }
+        }
+        let mut penetrations = 0;
+        let mut penetration_depth = worst(0.0, 0);
+        let mut opening = [f64::INFINITY, 0.0, 0.0];
+        let mut opening_max = worst(0.0, 0);
+        let (mut over_sigma, mut past_open) = (0, 0);
+        for h in &problem.hinges {
+            let p = h.map(|i| x[i as usize]);
+            let (depth, past) = penetration(&p);
+            let over_open = past > OPEN_SLACK && depth <= past;
+            if depth > OVERLAP_TOLERANCE && !over_open {
+                penetrations += 1;
+                if depth > penetration_depth.value {
+                    penetration_depth = worst(depth, h[0] as usize);
+                }
+            }
+            let scale = hinge_scale(&p).value;
+            opening[0] = opening[0].min(scale);
+            opening[1] += scale / problem.hinges.len() as f64;
+            if scale > opening[2] {
+                opening[2] = scale;
+                opening_max = worst(scale, h[0] as usize);
+            }
+            past_open += usize::from(over_open);
+            over_sigma += usize::from(scale > sigma + SIGMA_TOLERANCE || over_open);
+        }
+        if problem.hinges.is_empty() {
+            opening[0] = 0.0;
+        }
+        let (intersections, one) = intersections(problem, x, centroids);
+        Self {
+            edge_error_max,
+            edge_error_rms: (edge_sum / (3 * problem.triangles.len()).max(1) as f64).sqrt(),
+            penetrations,
+            penetration_depth,
+            intersections,
+            intersection_at: one.map(|t| worst(1.0, linkage.triangles[t].points[0].index())),
+            opening,
+            opening_max,
+            over_open: past_open,
+            over_sigma,
+            sigma,
+        }
+    }
+}
+
+/// A figure with its point.
+fn worst(positions: &[Point3<f64>], value: f64, point: usize) -> Worst {
+    Worst {
+        value,
+        point: PointId::from_index(point).0 + 1,
+        at_mm: positions
+            .get(point)
+            .copied()
+            .unwrap_or_else(Point3::origin)
+            .into(),
+    }
+}
+
+/// Positions in units of L.
+fn in_edges(linkage: &Linkage, positions: &[Point3<f64>]) -> Vec<Vector3<f64>> {
+    positions
+        .iter()
+        .map(|p| p.coords / linkage.edge_mm)
+        .collect()
 }
 
 /// Quality of a rationalised linkage. Lengths in L unless named otherwise.
@@ -81,25 +203,8 @@ impl Quality {
     ) -> Self {
         let edge_mm = linkage.edge_mm;
         let problem = Problem::new(linkage, sigma);
-        let x: Vec<Vector3<f64>> = positions.iter().map(|p| p.coords / edge_mm).collect();
-        let worst = |value: f64, point: usize| Worst {
-            value,
-            point: PointId::from_index(point).0 + 1,
-            at_mm: positions
-                .get(point)
-                .copied()
-                .unwrap_or_else(Point3::origin)
-                .into(),
-        };
-
-        let (mut edge_error_max, mut edge_sum) = (0.0f64, 0.0);
-        for t in &problem.triangles {
-            for k in 0..3 {
-                let error = ((x[t[(k + 1) % 3] as usize] - x[t[k] as usize]).norm() - 1.0).abs();
-                edge_error_max = edge_error_max.max(error);
-                edge_sum += error * error;
-            }
-        }
+        let x = in_edges(linkage, positions);
+        let worst = |value: f64, point: usize| worst(positions, value, point);
 
         let mut distance_max = worst(0.0, 0);
         let mut distance_sum = 0.0;
@@ -111,32 +216,7 @@ impl Quality {
             }
         }
 
-        let mut penetrations = 0;
-        let mut penetration_depth = worst(0.0, 0);
-        let mut opening = [f64::INFINITY, 0.0, 0.0];
-        let mut opening_max = worst(0.0, 0);
-        let mut over_sigma = 0;
-        for h in &problem.hinges {
-            let p = h.map(|i| x[i as usize]);
-            let (depth, past) = penetration(&p);
-            let over_open = past > OPEN_SLACK && depth <= past;
-            if depth > OVERLAP_TOLERANCE && !over_open {
-                penetrations += 1;
-                if depth > penetration_depth.value {
-                    penetration_depth = worst(depth, h[0] as usize);
-                }
-            }
-            let scale = hinge_scale(&p).value;
-            opening[0] = opening[0].min(scale);
-            opening[1] += scale / problem.hinges.len() as f64;
-            if scale > opening[2] {
-                opening[2] = scale;
-                opening_max = worst(scale, h[0] as usize);
-            }
-            over_sigma += usize::from(scale > sigma + SIGMA_TOLERANCE || over_open);
-        }
-
-        let centroids = centroids(&problem, &x);
+        let centroids = centroids(&problem.triangles, &x);
         let facing_away = problem
             .triangles
             .iter()
@@ -145,24 +225,24 @@ impl Quality {
                 faces_away(&t.map(|i| x[i as usize]), centroid, closest, edge_mm)
             })
             .count();
-        let (intersections, crossing) = intersections(&problem, &x, &centroids);
+        let own = Soundness::of(linkage, positions, &problem, &x, &centroids);
 
         Self {
             triangles: problem.triangles.len(),
             hinges: problem.hinges.len(),
             edge_mm,
-            edge_error_max,
-            edge_error_rms: (edge_sum / (3 * problem.triangles.len()).max(1) as f64).sqrt(),
+            edge_error_max: own.edge_error_max,
+            edge_error_rms: own.edge_error_rms,
             distance_max,
             distance_mean: distance_sum / positions.len().max(1) as f64,
-            penetrations,
-            penetration_depth,
-            intersections,
-            intersection_at: crossing.map(|t| worst(1.0, linkage.triangles[t].points[0].index())),
+            penetrations: own.penetrations,
+            penetration_depth: own.penetration_depth,
+            intersections: own.intersections,
+            intersection_at: own.intersection_at,
             facing_away,
-            opening,
-            opening_max,
-            over_sigma,
+            opening: own.opening,
+            opening_max: own.opening_max,
+            over_sigma: own.over_sigma,
             sigma,
             coverage: coverage(surface, &problem, &x, &centroids, edge_mm),
         }
@@ -185,7 +265,7 @@ pub fn failing(
         .iter()
         .map(|p| closest.query(*p).distance > accept_distance * edge_mm)
         .collect();
-    let centroids = centroids(&problem, &x);
+    let centroids = centroids(&problem.triangles, &x);
     let mut fails: Vec<bool> = problem
         .triangles
         .iter()
@@ -201,7 +281,7 @@ pub fn failing(
             fails[hinge.cw.triangle.index()] = true;
         }
     }
-    intersecting(&problem, &x, &centroids, |a, b| {
+    crossing(&problem.triangles, &x, &centroids, |a, b| {
         (fails[a], fails[b]) = (true, true)
     });
     (0..fails.len())
@@ -217,14 +297,6 @@ fn penetration(p: &[Vector3<f64>; 5]) -> (f64, f64) {
     let depth = -value(Condition::SecondClear).min(value(Condition::FirstClear));
     let past = -value(Condition::FirstOpen).min(value(Condition::SecondOpen));
     (depth, past)
-}
-
-fn centroids(problem: &Problem, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-    problem
-        .triangles
-        .iter()
-        .map(|t| t.iter().map(|&i| x[i as usize]).sum::<Vector3<f64>>() / 3.0)
-        .collect()
 }
 
 /// Whether a triangle (in L) faces away from the surface where that is nearest.
@@ -245,57 +317,11 @@ fn intersections(
     centroids: &[Vector3<f64>],
 ) -> (usize, Option<TriangleId>) {
     let (mut count, mut first) = (0, None);
-    intersecting(problem, x, centroids, |a, _| {
+    crossing(&problem.triangles, x, centroids, |a, _| {
         count += 1;
         first.get_or_insert(TriangleId::from_index(a));
     });
     (count, first)
-}
-
-/// Tells of every pair of triangles without a common point that cross.
-fn intersecting(
-    problem: &Problem,
-    x: &[Vector3<f64>],
-    centroids: &[Vector3<f64>],
-    mut tell: impl FnMut(usize, usize),
-) {
-    // Circumradius 1/√3: centroids of triangles that meet are no farther apart than twice that.
-    let reach = 2.0 / 3f64.sqrt();
-    let grid = PointGrid::new(centroids, reach);
-    for (n, centre) in centroids.iter().enumerate() {
-        grid.near(centre, reach, |other| {
-            if other <= n
-                || problem.triangles[n]
-                    .iter()
-                    .any(|i| problem.triangles[other].contains(i))
-            {
-                return;
-            }
-            let [a, b] = [n, other].map(|t| problem.triangles[t].map(|i| x[i as usize]));
-            if edges_cross(&a, &b) || edges_cross(&b, &a) {
-                tell(n, other);
-            }
-        });
-    }
-}
-
-/// True if an edge of `a` passes through the inside of `b` by more than the tolerance.
-fn edges_cross(a: &[Vector3<f64>; 3], b: &[Vector3<f64>; 3]) -> bool {
-    let Some(normal) = (b[1] - b[0]).cross(&(b[2] - b[0])).try_normalize(0.0) else {
-        return false;
-    };
-    (0..3).any(|k| {
-        let (p, q) = (a[k], a[(k + 1) % 3]);
-        let (dp, dq) = ((p - b[0]).dot(&normal), (q - b[0]).dot(&normal));
-        if dp.min(dq) > -OVERLAP_TOLERANCE || dp.max(dq) < OVERLAP_TOLERANCE {
-            return false;
-        }
-        let at = p + (q - p) * (dp / (dp - dq));
-        (0..3).all(|s| {
-            let edge = b[(s + 1) % 3] - b[s];
-            edge.cross(&(at - b[s])).dot(&normal) > OVERLAP_TOLERANCE * edge.norm()
-        })
-    })
 }
 
 /// Part of the surface's area that lies within [`COVERAGE_RADIUS`] of a triangle, sampled at every face's centroid

@@ -14,12 +14,15 @@
 //! - the pull towards the beginning of the stage (not of the solve) stops drift along the surface without biasing the
 //!   result.
 //!
-//! The last stage ends when edges and conditions hold to rounding.
+//! The last stage ends when edges and conditions hold to rounding. Then triangles that cross though no hinge joins them
+//! get conditions of their own ([`contact`]), and the last stages run again.
 
+mod contact;
 mod system;
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
+use self::contact::{Contact, contacts};
 use self::system::System;
 use super::RationalizeError;
 use super::problem::{CONDITIONS, Problem, hinge_violations};
@@ -97,6 +100,10 @@ const STEPS: usize = 15;
 const LAST_STEPS: usize = 16;
 /// A stage ends when a step gains, or promises, less than this part of the energy.
 const GAIN: f64 = 0.02;
+/// Rounds of parting triangles that cross.
+const PARTINGS: usize = 6;
+/// The stage that the solve goes back to in each of them.
+const RESUME: usize = 2;
 /// Edges are exact when none is off by more than this, in L; conditions when none is violated by more.
 const EXACT: f64 = 1e-13;
 /// A hinge gets its blocks when one of its bounds is nearer than this at the start, in L.
@@ -131,6 +138,7 @@ pub(crate) fn solve(
         progress.advance(1);
     }
     solver.run(&LAST, LAST_STEPS, progress)?;
+    solver.part(progress)?;
     progress.advance(1);
     Ok((solver.positions_mm(), solver.effort))
 }
@@ -157,6 +165,7 @@ struct Solver<'a> {
     draws: Vec<Draw>,
     trial_draws: Vec<Draw>,
     near: Vec<bool>,
+    contacts: Vec<Contact>,
     system: System,
     step: Vec<f64>,
     effort: Effort,
@@ -176,7 +185,7 @@ impl<'a> Solver<'a> {
             .iter()
             .map(|h| slack(problem, &h.map(|i| x[i as usize])) < NEAR)
             .collect();
-        let system = System::new(problem, &near)?;
+        let system = System::new(problem, &near, &[])?;
         let faces = match target {
             Target::Surface(closest) => start.iter().map(|p| closest.query(*p).face).collect(),
             Target::Places(_) => Vec::new(),
@@ -196,6 +205,7 @@ impl<'a> Solver<'a> {
             draws: vec![none; x.len()],
             trial_draws: vec![none; x.len()],
             near,
+            contacts: Vec::new(),
             system,
             step: vec![0.0; 3 * x.len()],
             effort: Effort {
@@ -209,6 +219,34 @@ impl<'a> Solver<'a> {
     fn positions_mm(&self) -> Vec<Point3<f64>> {
         let mm = |p: &Vector3<f64>| Point3::from(p * self.edge_mm);
         self.x.iter().map(mm).collect()
+    }
+
+    /// Parts triangles that cross though no hinge joins them; where that cannot be done, the fewest crossings that were
+    /// found stay.
+    fn part(&mut self, progress: &dyn Progress) -> Result<(), RationalizeError> {
+        let mut least = None;
+        for _ in 0..PARTINGS {
+            let found = contacts(self.problem, &self.x);
+            if least.as_ref().is_none_or(|(n, _)| found.len() < *n) {
+                least = Some((found.len(), self.x.clone()));
+            }
+            if found.is_empty() {
+                break;
+            }
+            self.contacts.extend(found);
+            self.system = System::new(self.problem, &self.near, &self.contacts)?;
+            self.effort.analyses += 1;
+            for stage in &STAGES[RESUME..] {
+                self.run(stage, STEPS, progress)?;
+            }
+            self.run(&LAST, LAST_STEPS, progress)?;
+        }
+        if let Some((n, x)) = least
+            && n < contacts(self.problem, &self.x).len()
+        {
+            self.x = x;
+        }
+        Ok(())
     }
 
     /// What draws the points of `trial`, into `trial_draws`.
@@ -268,6 +306,12 @@ impl<'a> Solver<'a> {
                 sum += r * r;
             }
         }
+        for contact in &self.contacts {
+            if let Some((clear, _)) = contact.evaluate(x) {
+                let r = rounded(-clear, stage.rounding).value;
+                sum += r * r;
+            }
+        }
         let target = stage.weight * stage.weight;
         let proximal = target * PROXIMAL * PROXIMAL;
         for ((x, begin), draw) in x.iter().zip(&self.begin).zip(&self.trial_draws) {
@@ -286,7 +330,7 @@ impl<'a> Solver<'a> {
         }
         let wider = self.problem.hinges.iter().zip(&self.near);
         self.near = wider.map(|(h, near)| *near || least(h) < NEARER).collect();
-        self.system = System::new(self.problem, &self.near)?;
+        self.system = System::new(self.problem, &self.near, &self.contacts)?;
         self.effort.analyses += 1;
         Ok(())
     }
@@ -327,6 +371,16 @@ impl<'a> Solver<'a> {
                 }
             }
         }
+        for (n, contact) in self.contacts.iter().enumerate() {
+            if let Some((clear, gradient)) = contact.evaluate(x) {
+                let bend = rounded(-clear, stage.rounding);
+                let curvature = bend.slope * bend.slope + bend.value * bend.curvature;
+                if curvature > NEGLIGIBLE {
+                    let clique = system.contact(n);
+                    system.add_clique(clique, &gradient, curvature, -bend.value * bend.slope);
+                }
+            }
+        }
         let target = stage.weight * stage.weight;
         let proximal = target * PROXIMAL * PROXIMAL;
         for i in 0..problem.points {
@@ -364,6 +418,9 @@ impl<'a> Solver<'a> {
         }
         for h in &self.problem.hinges {
             worst = worst.max(-slack(self.problem, &h.map(|i| x[i as usize])));
+        }
+        for (clear, _) in self.contacts.iter().filter_map(|c| c.evaluate(x)) {
+            worst = worst.max(-clear);
         }
         worst
     }

@@ -7,6 +7,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::super::problem::Problem;
+use super::contact::Contact;
 use crate::base::sparse::{Cholesky, FactorError, Pattern};
 
 /// Where one 3 × 3 block of the matrix is stored: the slots of its three columns' first entries.
@@ -38,11 +39,13 @@ const NONE: u32 = u32::MAX;
 /// Points that share conditions, and the blocks of their pairs.
 #[derive(Clone, Copy, Debug)]
 struct Blocks {
+    /// Five, or four and the last once more.
     points: [u32; 5],
+    /// Ten, or six that matter.
     pairs: [Block; 10],
 }
 
-/// A clique of a [`System`]: a hinge's five points.
+/// A clique of a [`System`]: a hinge's five points, or a contact's four.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clique(u32);
 
@@ -54,6 +57,8 @@ pub(super) struct System {
     sides: Vec<[Block; 3]>,
     /// For every hinge its clique, or [`NONE`].
     hinges: Vec<u32>,
+    /// The first contact's clique.
+    contacts: u32,
     cliques: Vec<Blocks>,
     matrix: Vec<f64>,
     damped: Vec<f64>,
@@ -61,15 +66,23 @@ pub(super) struct System {
 }
 
 impl System {
-    /// A system with blocks for the edges and for the hinges that `near` names.
-    pub fn new(problem: &Problem, near: &[bool]) -> Result<Self, FactorError> {
+    /// A system with blocks for the edges, for the hinges that `near` names and for the points of `contacts`.
+    pub fn new(
+        problem: &Problem,
+        near: &[bool],
+        contacts: &[Contact],
+    ) -> Result<Self, FactorError> {
         let sides = problem
             .triangles
             .iter()
             .flat_map(|t| (0..3).map(move |k| (t[k], t[(k + 1) % 3])));
         let chosen = problem.hinges.iter().zip(near).filter(|(_, near)| **near);
         let pairs = chosen.flat_map(|(h, _)| PAIRS.iter().map(move |&(i, j)| (h[i], h[j])));
-        let points = Pattern::new(problem.points, sides.chain(pairs));
+        let touching = contacts.iter().flat_map(|c| {
+            let p = c.points;
+            (0..3).map(move |i| (p[i], p[3]))
+        });
+        let points = Pattern::new(problem.points, sides.chain(pairs).chain(touching));
         let cholesky = Cholesky::new(points.expanded(3))?;
         let pattern = cholesky.pattern();
         let block = |i: u32, j: u32| -> Block {
@@ -104,8 +117,18 @@ impl System {
                 });
             }
         }
+        let first_contact = cliques.len() as u32;
+        cliques.extend(contacts.iter().map(|contact| {
+            let [h, b, a, c] = contact.points;
+            let points = [h, b, a, c, c];
+            Blocks {
+                points,
+                pairs: PAIRS.map(|(i, j)| block(points[i], points[j])),
+            }
+        }));
         let matrix = vec![0.0; pattern.entries()];
         Ok(Self {
+            contacts: first_contact,
             diagonal,
             sides,
             hinges,
@@ -122,6 +145,12 @@ impl System {
     pub fn hinge(&self, n: usize) -> Option<Clique> {
         let clique = self.hinges[n];
         (clique != NONE).then_some(Clique(clique))
+    }
+
+    /// The clique of a contact.
+    #[inline]
+    pub fn contact(&self, n: usize) -> Clique {
+        Clique(self.contacts + n as u32)
     }
 
     /// Empties matrix and right-hand side.
@@ -180,7 +209,7 @@ impl System {
     pub fn add_clique(
         &mut self,
         clique: Clique,
-        gradient: &[Vector3<f64>; 5],
+        gradient: &[Vector3<f64>],
         curvature: f64,
         slope: f64,
     ) {
@@ -189,7 +218,9 @@ impl System {
             self.add_outer(i, g, curvature);
             self.pull(i, g, slope);
         }
-        for (block, &(i, j)) in pairs.iter().zip(&PAIRS) {
+        // Pairs of the first points come first.
+        let count = gradient.len() * (gradient.len() - 1) / 2;
+        for (block, &(i, j)) in pairs.iter().zip(&PAIRS).take(count) {
             let (column, row) = if points[i] < points[j] {
                 (&gradient[i], &gradient[j])
             } else {
