@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::layout_args::{CutArg, LayoutArgs, SizeArgs};
-use super::surface_args::SurfaceArgs;
+use super::surface_args::{SurfaceArgs, source};
 use super::{Failure, Global, Terminal, print, print_json};
 use crate::base::atomic::check_directory;
 use crate::job::{ACCEPT_DISTANCE, Design, FILES, FlapWish, Made, MakeError, Request, make};
@@ -25,6 +25,9 @@ earlier run wrote; a design brings every decision with it, and only -o, --force 
 pub struct MakeArgs {
     #[command(flatten)]
     surface: SurfaceArgs,
+    /// A further surface that the same sheet is to fit: the same mesh in another shape, in the same units; repeatable
+    #[arg(long, value_name = "SURFACE")]
+    also: Vec<String>,
     /// Directory for the results; it appears complete or not at all [default: the surface's name]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -177,6 +180,7 @@ fn decided_by_design(args: &MakeArgs) -> Vec<&'static str> {
         (args.machine != crate::machine::DEFAULT, "--machine"),
         (args.hinge.is_some(), "--hinge"),
         (args.kerf.is_some(), "--kerf"),
+        (!args.also.is_empty(), "--also"),
         (!args.cuts.is_empty(), "--cut"),
         (matches!(args.leave_out, LeaveOutArg::None), "--leave-out"),
         (args.orientation.0.is_some(), "--orientation"),
@@ -217,6 +221,8 @@ fn from_design(args: &MakeArgs) -> Result<Request, Failure> {
 fn from_arguments(args: &MakeArgs) -> Result<Request, Failure> {
     Ok(Request {
         source: args.surface.source(),
+        also: args.also.iter().map(|name| source(name)).collect(),
+        shares: None,
         import: args.surface.options(),
         material: args.size.material.clone(),
         machine: args.machine.clone(),

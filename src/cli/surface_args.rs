@@ -33,6 +33,17 @@ pub struct SurfaceArgs {
     pub part: Option<Part>,
 }
 
+/// What a request calls a surface.
+pub fn source(name: &str) -> Source {
+    match name.strip_prefix("sample:") {
+        Some(sample) => Source::Sample(sample.to_owned()),
+        None => Source::File {
+            path: name.into(),
+            sha256: None,
+        },
+    }
+}
+
 /// Values of `--part`.
 #[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
@@ -58,13 +69,7 @@ impl SurfaceArgs {
 
     /// What a request calls it.
     pub fn source(&self) -> Source {
-        match self.surface.strip_prefix("sample:") {
-            Some(sample) => Source::Sample(sample.to_owned()),
-            None => Source::File {
-                path: (&self.surface).into(),
-                sha256: None,
-            },
-        }
+        source(&self.surface)
     }
 
     /// Reads the file, or makes the sample; `--unit`, `--scale` and `--size` hold for both.

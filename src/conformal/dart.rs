@@ -82,7 +82,7 @@ pub fn patches(surface: &Surface, layout: &Layout, exclude_mm: f64, sigma: f64) 
         if v.iter().all(|v| layout.cone_distance_mm[*v] <= exclude_mm) {
             return 0.0;
         }
-        super::layout::excess(layout.scale_at(surface, face, [1.0 / 3.0; 3]), sigma)
+        super::layout::excess(layout.face_range(&v).map(f64::exp), sigma)
     };
     let excess: Per<_, f64> = surface.faces().ids().map(off).collect();
     let mut joined = Union::new(surface.faces().len());
@@ -116,7 +116,7 @@ pub fn patches(surface: &Surface, layout: &Layout, exclude_mm: f64, sigma: f64) 
         .into_values()
         .map(|(sum, (_, _, peak))| Patch {
             peak,
-            scale: layout.log_scale[peak].exp(),
+            scale: layout.range(peak)[1].exp(),
             misfit_mm: sum.sqrt(),
         })
         .collect();

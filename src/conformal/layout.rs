@@ -7,6 +7,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use nalgebra::{Complex, ComplexField as _, Point2};
 
@@ -63,6 +64,8 @@ pub struct Layout {
     pub corners: Per<FaceId, [Point2<f64>; 3]>,
     /// ln λ per vertex; λ is millimetres on the surface per millimetre on the closed sheet.
     pub log_scale: Per<VertexId, f64>,
+    /// What is beside it where one sheet is to take several shapes.
+    pub spread: Option<Spread>,
     /// The cones, in the order given.
     pub cones: Vec<Cone>,
     /// Flat distance of every vertex from the nearest cone, millimetres; infinite without cones.
@@ -76,6 +79,26 @@ pub struct Layout {
     /// How far the two sides of the cut are from being each other's image under the transitions, millimetres:
     /// rounding, gathered on the way around cones and handles.
     pub seam_gap_mm: f64,
+}
+
+/// How λ differs between several shapes that one sheet is to take: at each vertex the least and the largest ln of the
+/// factor by which a shape is larger there than the surface that is mapped.
+#[derive(Clone, Debug)]
+pub struct Spread(Arc<Per<VertexId, [f64; 2]>>);
+
+impl Spread {
+    /// Over shapes, at least one, that are given by their ln factor at each vertex.
+    pub fn over(vertices: usize, shapes: &[Per<VertexId, f64>]) -> Self {
+        let mut ends =
+            Per::<VertexId, [f64; 2]>::filled(vertices, [f64::INFINITY, f64::NEG_INFINITY]);
+        for shape in shapes {
+            for ([low, high], factor) in ends.iter_mut().zip(shape.iter()) {
+                *low = low.min(*factor);
+                *high = high.max(*factor);
+            }
+        }
+        Self(Arc::new(ends))
+    }
 }
 
 /// A rotation across the cut may be this far from a multiple of 120°, radians: far above rounding, far below what a
@@ -173,6 +196,7 @@ impl Layout {
         let mut layout = Self {
             corners,
             log_scale: metric.u.iter().map(|u| -u).collect(),
+            spread: None,
             cones: cones.to_vec(),
             cone_distance_mm: distance::from_cones(surface, metric, cones),
             segments: cut::segments(surface, cones, edges),
@@ -237,6 +261,23 @@ impl Layout {
             .exp()
     }
 
+    /// The least and the largest ln λ at a vertex, over all shapes that the sheet is to take.
+    #[inline]
+    pub fn range(&self, vertex: VertexId) -> [f64; 2] {
+        let own = self.log_scale[vertex];
+        match &self.spread {
+            Some(spread) => spread.0[vertex].map(|more| own + more),
+            None => [own; 2],
+        }
+    }
+
+    /// The same in the middle of a face, of which these are the corners.
+    #[inline]
+    pub fn face_range(&self, corners: &[VertexId; 3]) -> [f64; 2] {
+        let ends = corners.map(|v| self.range(v));
+        [0, 1].map(|end| ends.iter().map(|e| e[end]).sum::<f64>() / 3.0)
+    }
+
     /// λ's range over the vertices farther than `exclude_mm` (on the flat sheet) from every cone, and the part of the
     /// surface's area, the cones' neighbourhoods left out, where λ lies in [1, `sigma`].
     pub fn scale_summary(&self, surface: &Surface, exclude_mm: f64, sigma: f64) -> ScaleSummary {
@@ -250,19 +291,16 @@ impl Layout {
         let mut total = 0.0;
         for (face, v) in self.far_from_cones(surface, exclude_mm) {
             for &v in v.iter().filter(|v| self.cone_distance_mm[**v] > exclude_mm) {
-                let scale = self.log_scale[v].exp();
-                summary.min = summary.min.min(scale);
+                let [least, scale] = self.range(v).map(f64::exp);
+                summary.min = summary.min.min(least);
                 if scale > summary.max || (scale == summary.max && v < summary.max_vertex) {
                     (summary.max, summary.max_vertex) = (scale, v);
                 }
             }
-            let (area, scale) = (
-                surface.face_area(face),
-                self.scale_at(surface, face, [1.0 / 3.0; 3]),
-            );
+            let (area, ends) = (surface.face_area(face), self.face_range(v).map(f64::exp));
             total += area;
-            summary.misfit_mm += area * excess(scale, sigma).powi(2);
-            if (1.0 - 1e-9..=sigma + 1e-9).contains(&scale) {
+            summary.misfit_mm += area * excess(ends, sigma).powi(2);
+            if ends[0] >= 1.0 - 1e-9 && ends[1] <= sigma + 1e-9 {
                 summary.inside += area;
             }
         }
@@ -287,27 +325,21 @@ impl Layout {
     /// The smallest λ of the window [λ, σ λ] outside which the surface has the least misfit, the cones' neighbourhoods
     /// left out.
     pub fn best_window(&self, surface: &Surface, exclude_mm: f64, sigma: f64) -> f64 {
-        let parts: Vec<(f64, f64)> = self
+        let parts: Vec<([f64; 2], f64)> = self
             .far_from_cones(surface, exclude_mm)
-            .map(|(face, v)| {
-                let mean = v.iter().map(|&v| self.log_scale[v]).sum::<f64>() / 3.0;
-                (mean, surface.face_area(face))
-            })
+            .map(|(face, v)| (self.face_range(v), surface.face_area(face)))
             .collect();
         let width = sigma.ln();
         // Half the derivative of ∫ e² dA by the window's lower end; it grows, so its zero is found by halving.
         let slope = |low: f64| -> f64 {
-            let each = |&(x, area): &(f64, f64)| {
-                let (below, above) = ((low - x).max(0.0), (x - low - width).max(0.0));
+            let each = |&([least, most], area): &([f64; 2], f64)| {
+                let (below, above) = ((low - least).max(0.0), (most - low - width).max(0.0));
                 area * (BELOW * BELOW * below - above)
             };
             parts.iter().map(each).sum()
         };
-        let ends = |f: fn(f64, f64) -> f64, start: f64| parts.iter().map(|p| p.0).fold(start, f);
-        let (mut low, mut high) = (
-            ends(f64::min, f64::INFINITY) - width,
-            ends(f64::max, f64::NEG_INFINITY),
-        );
+        let mut low = parts.iter().map(|p| p.0[0]).fold(f64::INFINITY, f64::min) - width;
+        let mut high = (parts.iter().map(|p| p.0[1])).fold(f64::NEG_INFINITY, f64::max);
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
             if slope(middle) > 0.0 {
@@ -504,9 +536,9 @@ impl Layout {
     }
 }
 
-/// How far ln λ lies outside [0, ln σ], what is below counted [`BELOW`] times.
-pub(super) fn excess(scale: f64, sigma: f64) -> f64 {
-    (scale / sigma).ln().max(-BELOW * scale.ln()).max(0.0)
+/// How far ln λ, from its least to its largest value, reaches outside [0, ln σ], what is below counted [`BELOW`] times.
+pub(super) fn excess([least, most]: [f64; 2], sigma: f64) -> f64 {
+    (most / sigma).ln().max(-BELOW * least.ln()).max(0.0)
 }
 
 #[inline]

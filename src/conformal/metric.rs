@@ -15,7 +15,7 @@ use std::f64::consts::PI;
 use super::intrinsic::{FlatFace, Intrinsic};
 pub(super) use super::linear::LinearModel;
 use super::system::{Energy, System, Unknowns, dot, norm};
-use super::{CURVATURE_UNIT, ConformalError, Singularities};
+use super::{CURVATURE_UNIT, ConformalError, Singularities, Spread};
 use crate::base::ids::{Id as _, Per};
 use crate::base::progress::Progress;
 use crate::mesh::{FaceId, Surface, VertexId};
@@ -119,6 +119,7 @@ pub struct MetricSolver<'a> {
     straight: Vec<usize>,
     unknowns: Unknowns,
     system: System,
+    spread: Option<Spread>,
 }
 
 /// The unknown of every vertex: its own inside and on straight rims, one for each other rim. One of those, or a vertex,
@@ -196,7 +197,20 @@ impl<'a> MetricSolver<'a> {
             straight: Vec::new(),
             system: system(surface, &unknowns)?,
             unknowns,
+            spread: None,
         })
+    }
+
+    /// The same solver for a sheet that is to take several shapes: λ of its layouts is judged over all of them.
+    #[must_use]
+    pub fn among(mut self, spread: Option<Spread>) -> Self {
+        self.spread = spread;
+        self
+    }
+
+    /// How the shapes differ that its layouts are judged over.
+    pub(super) fn spread(&self) -> Option<&Spread> {
+        self.spread.as_ref()
     }
 
     /// The surface that it solves for.

@@ -26,7 +26,7 @@ pub use cut::{Segment, cut_graph};
 pub use dart::{Dart, Patch, around_handles, patches, slit_along, to_goals};
 pub(crate) use distance::from_vertices;
 pub(crate) use geodesic::{Stretch, straight_way};
-pub use layout::{Layout, ScaleSummary, Transition};
+pub use layout::{Layout, ScaleSummary, Spread, Transition};
 pub use metric::{Metric, MetricSolver};
 pub use propose::{
     ConeRequest, FlattenOptions, Flattened, Sizing, Wish, choose_turnings,

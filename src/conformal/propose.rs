@@ -271,7 +271,8 @@ impl Flattened {
         let surface = solver.surface();
         let metric = solver.solve(singularities, progress)?;
         let cut = cut_graph(surface, &singularities.cones);
-        let layout = Layout::unfold(surface, &metric, &singularities.cones, &cut)?;
+        let mut layout = Layout::unfold(surface, &metric, &singularities.cones, &cut)?;
+        layout.spread = solver.spread().cloned();
         Ok(size(
             surface,
             layout,

@@ -11,12 +11,13 @@ use super::load::Loaded;
 use super::maps::{Ground, Map, maps};
 use super::request::Request;
 use super::shape::{Shape, Stock, attempt};
+use super::targets::Targets;
 use super::verdict::place;
 use crate::base::progress::Progress;
 use crate::base::units::short;
 use crate::conformal::{ConformalError, Dart, around_handles, patches, to_goals};
 use crate::linkage::SeamGuide;
-use crate::mesh::{ClosestPoint, Surface, VertexId};
+use crate::mesh::{Surface, VertexId};
 
 /// Linkages tried on one surface before it gets another dart, and in all once there is nothing more to open.
 const TRIED: usize = 4;
@@ -28,15 +29,71 @@ const RETRIED: usize = 2;
 /// surface by about a third of that.
 const PROMISING: f64 = 0.7;
 
-/// Finds the shape: the first map that passes, with as few darts as possible, else the one that comes closest.
+/// Finds the shape that fits all targets: on the surface that the request names to lay the pattern on, else on the first
+/// of [`Targets::patterns`] on which one passes, else on that which comes closest to its worst target.
 pub(crate) fn choose(
     request: &Request,
     loaded: &Loaded,
     stock: &Stock<'_>,
-    closest: &ClosestPoint,
+    targets: &Targets,
     progress: &dyn Progress,
 ) -> Result<Shape, MakeError> {
-    let original = &loaded.import.surface;
+    let patterns = match &request.shares {
+        Some(shares) => vec![shares.clone()],
+        None => targets.patterns(),
+    };
+    let mut best: Option<Shape> = None;
+    let mut refused = None;
+    for shares in patterns {
+        if targets.several() {
+            progress.note(&laid_on(&shares, targets));
+        }
+        let surface = targets.mixed(&shares)?;
+        let shape = match choose_on(request, loaded, &surface, stock, targets, progress) {
+            Ok(shape) => Shape { shares, ..shape },
+            // Where a mean cannot be used, one of the surfaces may.
+            Err(error) if targets.several() && progress.check().is_ok() => {
+                refused.get_or_insert(error);
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
+        if shape.verdict.pass {
+            return Ok(shape);
+        }
+        let nearer = |old: &Shape| shape.worst_distance() < old.worst_distance();
+        if best.as_ref().is_none_or(nearer) {
+            best = Some(shape);
+        }
+    }
+    let nothing = || MakeError::Internal("no pattern was tried".into());
+    best.ok_or_else(|| refused.unwrap_or_else(nothing))
+}
+
+/// Which surface the pattern is laid on, in words.
+pub(crate) fn laid_on(shares: &[f64], targets: &Targets) -> String {
+    match shares.iter().position(|&s| s == 1.0) {
+        Some(alone) => format!("the pattern is laid on {}", targets.0[alone].name),
+        None => {
+            let shares: Vec<String> = shares.iter().map(|s| short(100.0 * s, 1)).collect();
+            format!(
+                "the pattern is laid on the mean of the surfaces ({} %)",
+                shares.join(" + ")
+            )
+        }
+    }
+}
+
+/// Finds the shape with the pattern on one surface, `original`: the first map that passes, with as few darts as possible,
+/// else the one that comes closest.
+fn choose_on(
+    request: &Request,
+    loaded: &Loaded,
+    original: &Surface,
+    stock: &Stock<'_>,
+    targets: &Targets,
+    progress: &dyn Progress,
+) -> Result<Shape, MakeError> {
     let guide = SeamGuide::new(original)
         .along(original, &loaded.cuts)
         .map_err(MakeError::Conformal)?;
@@ -46,7 +103,7 @@ pub(crate) fn choose(
     // Darts that are no proposal to be taken back: those asked for, and those that open handles.
     let mut fixed = darts.len();
     loop {
-        let ground = Arc::new(Ground::new(original, &darts, &guide).map_err(MakeError::Conformal)?);
+        let ground = Arc::new(Ground::new(original, &darts, &guide, &targets.0)?);
         free &= darts.len() < fixed + MOST_DARTS;
         let found = match maps(
             request,
@@ -79,8 +136,8 @@ pub(crate) fn choose(
             let promising = map.misfit() < PROMISING;
             if tries.on(&ground) >= TRIED || next.is_some() && !promising {
                 tries.waiting.push(map);
-            } else if let Some(shape) = tries.attempt(request, map, stock, closest, progress)? {
-                return with_fewer_darts(request, original, shape, fixed, stock, closest, progress);
+            } else if let Some(shape) = tries.attempt(request, map, stock, targets, progress)? {
+                return with_fewer_darts(request, original, shape, fixed, stock, targets, progress);
             }
         }
         let Some(dart) = next else { break };
@@ -98,8 +155,8 @@ pub(crate) fn choose(
         if tries.count >= TRIED {
             break;
         }
-        if let Some(shape) = tries.attempt(request, map, stock, closest, progress)? {
-            return with_fewer_darts(request, original, shape, fixed, stock, closest, progress);
+        if let Some(shape) = tries.attempt(request, map, stock, targets, progress)? {
+            return with_fewer_darts(request, original, shape, fixed, stock, targets, progress);
         }
     }
     let nothing = || MakeError::Internal("no layout was tried".into());
@@ -116,7 +173,7 @@ fn with_fewer_darts(
     shape: Shape,
     fixed: usize,
     stock: &Stock<'_>,
-    closest: &ClosestPoint,
+    targets: &Targets,
     progress: &dyn Progress,
 ) -> Result<Shape, MakeError> {
     let mut best = shape;
@@ -127,7 +184,7 @@ fn with_fewer_darts(
         let mut darts = best.ground.darts.clone();
         darts.remove(next);
         next += 1;
-        let Ok(ground) = Ground::new(original, &darts, &best.ground.guide) else {
+        let Ok(ground) = Ground::new(original, &darts, &best.ground.guide, &targets.0) else {
             continue;
         };
         let Ok(found) = maps(request, None, &Arc::new(ground), stock.sigma, progress) else {
@@ -139,7 +196,7 @@ fn with_fewer_darts(
                 break;
             }
             // What goes wrong here does not cost the shape that passes already.
-            match tries.attempt(request, map, stock, closest, progress) {
+            match tries.attempt(request, map, stock, targets, progress) {
                 Ok(Some(shape)) => {
                     progress.note("one dart less will do");
                     best = shape;
@@ -201,11 +258,11 @@ impl Tries {
         request: &Request,
         map: Map,
         stock: &Stock<'_>,
-        closest: &ClosestPoint,
+        targets: &Targets,
         progress: &dyn Progress,
     ) -> Result<Option<Shape>, MakeError> {
         self.here.1 += 1;
-        let shape = match attempt(request, map, stock, closest, progress) {
+        let shape = match attempt(request, map, stock, targets, progress) {
             Ok(shape) => shape,
             // A map may ask for triangles that are too small for the hinges, or for too many, where another does not.
             Err(error @ (MakeError::Pattern(_) | MakeError::Linkage(_)))
@@ -222,10 +279,9 @@ impl Tries {
         }
         progress.note(&format!(
             "tried: the sheet misses the surface by {} L",
-            short(shape.quality.distance_max.value, 2)
+            short(shape.worst_distance(), 2)
         ));
-        let nearer =
-            |old: &Shape| shape.quality.distance_max.value < old.quality.distance_max.value;
+        let nearer = |old: &Shape| shape.worst_distance() < old.worst_distance();
         if self.best.as_ref().is_none_or(nearer) {
             self.best = Some(shape);
         }

@@ -27,6 +27,9 @@ pub struct Design {
     pub format: u32,
     /// Where the surface comes from.
     pub surface: SurfaceChoice,
+    /// Further surfaces that the sheet is to fit; none if the list is absent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub also: Vec<AlsoChoice>,
     /// What it is cut from, and with what.
     pub sheet: SheetChoice,
     /// How the lattice lies on it.
@@ -62,6 +65,21 @@ pub struct SurfaceChoice {
     /// True if only the largest of several parts is used.
     #[serde(default, skip_serializing_if = "is_false")]
     pub largest_part: bool,
+}
+
+/// `[[also]]`: a further surface, the first one's mesh in another shape, with its millimetres per unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AlsoChoice {
+    /// A mesh file, relative to the design file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// A sample with its parameters, in place of a file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sample: Option<String>,
+    /// SHA-256 of the mesh file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sha256: Option<String>,
 }
 
 /// `[sheet]`.
@@ -104,6 +122,9 @@ pub struct LinkageChoice {
     /// Doubled rows along the seams.
     #[serde(default)]
     pub flaps: FlapWish,
+    /// Share of each surface, in their order, in the one that the pattern is laid on; absent: the only one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shares: Vec<f64>,
     /// Rims that are straight hems, counted from 1.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub straight_rims: Vec<usize>,
@@ -236,6 +257,24 @@ impl Design {
                 ));
             }
         }
+        for (i, also) in self.also.iter().enumerate() {
+            if also.file.is_some() == also.sample.is_some() {
+                return Err(Complaint::new(
+                    format!("also[{i}]"),
+                    "needs exactly one of file and sample",
+                ));
+            }
+        }
+        let surfaces = 1 + self.also.len();
+        if surfaces > 1 && self.linkage.shares.len() != surfaces {
+            return Err(Complaint::new(
+                "linkage.shares",
+                format!("needs {surfaces} numbers, one for each surface"),
+            ));
+        }
+        for share in &self.linkage.shares {
+            ranged("linkage.shares", *share, 0.0, 1.0)?;
+        }
         ranged("surface.mm_per_unit", self.surface.mm_per_unit, 1e-9, 1e9)?;
         ranged(
             "sheet.hinge_width_mm",
@@ -301,13 +340,18 @@ impl Design {
                 name.to_owned()
             }
         };
-        let source = match (&self.surface.file, &self.surface.sample) {
-            (Some(file), _) => Source::File {
-                path: beside(file),
-                sha256: self.surface.sha256.clone(),
-            },
-            (None, sample) => Source::Sample(sample.clone().unwrap_or_default()),
-        };
+        let source =
+            |file: &Option<String>, sample: &Option<String>, sha256: &Option<String>| match (
+                file, sample,
+            ) {
+                (Some(file), _) => Source::File {
+                    path: beside(file),
+                    sha256: sha256.clone(),
+                },
+                (None, sample) => Source::Sample(sample.clone().unwrap_or_default()),
+            };
+        let surface = &self.surface;
+        let further = self.also.iter();
         let cones = self
             .cone
             .iter()
@@ -322,7 +366,11 @@ impl Design {
         let darts = self.dart.iter().map(|d| path(&d.vertices, &d.points_mm));
         let cuts = self.cut.iter().map(|c| path(&c.vertices, &c.points_mm));
         Request {
-            source,
+            source: source(&surface.file, &surface.sample, &surface.sha256),
+            also: further
+                .map(|also| source(&also.file, &also.sample, &also.sha256))
+                .collect(),
+            shares: Some(self.linkage.shares.clone()).filter(|shares| !shares.is_empty()),
             import: ImportOptions {
                 units: Units {
                     unit: Unit::Millimetre,

@@ -31,7 +31,7 @@ pub struct Explored {
 }
 
 /// Maps the surface of `request`. With cones left to the program this is the map without any, unless it is asked to
-/// `propose`, or none is possible without.
+/// `propose`, or none is possible without. Further surfaces are not looked at.
 ///
 /// # Errors
 /// [`MakeError`] for input that cannot be used, a map that does not exist, or an interruption.
@@ -40,6 +40,12 @@ pub fn explore(
     propose: bool,
     progress: &dyn Progress,
 ) -> Result<Explored, MakeError> {
+    // A map is one of the first surface.
+    let request = &Request {
+        also: Vec::new(),
+        shares: None,
+        ..request.clone()
+    };
     let material = crate::material::load(&request.material).map_err(MakeError::Material)?;
     let sigma = checked_sigma(request.sigma.unwrap_or(material.sigma.max))?;
     check_sizing(request.sizing)?;
@@ -52,7 +58,7 @@ pub fn explore(
     // No sheet is cut here, so that it is all one where a seam would run.
     let guide = SeamGuide::new(surface);
     let mut found = loop {
-        let ground = Arc::new(Ground::new(surface, &darts, &guide).map_err(MakeError::Conformal)?);
+        let ground = Arc::new(Ground::new(surface, &darts, &guide, &[])?);
         match mapped(request, &loaded, &ground, sigma, propose, progress) {
             Err(MakeError::Conformal(
                 error @ (ConformalError::Holonomy { .. } | ConformalError::TotalCurvature { .. }),
@@ -166,6 +172,7 @@ impl Explored {
             removed: map.removal,
             left_out: &[],
             orientation_deg: laid.orientation_deg,
+            shares: &[1.0],
         };
         Ok(decided(request, folder, &self.loaded, &taken, &stock))
     }

@@ -5,10 +5,13 @@ use sha2::{Digest as _, Sha256};
 
 use super::MakeError;
 use super::design::{ConeChoice, CutChoice, DartChoice};
+use super::make::title;
 use super::request::{ConePlace, ConeWish, DartWish, Request, Source};
+use super::targets::{Target, Targets, check_match, follow};
 use crate::conformal::{Cone, Dart, vertex_from_number};
 use crate::mesh::{
-    Closest, ClosestPoint, Import, Sample, Surface, VertexId, import_bytes, insert_point,
+    Closest, ClosestPoint, Import, ImportOptions, Sample, Surface, Unit, Units, VertexId,
+    import_bytes, insert_point,
 };
 
 /// A surface with the decisions about it.
@@ -29,17 +32,39 @@ pub(crate) struct Loaded {
     pub cuts: Vec<Vec<VertexId>>,
     /// As they will stand in the design file.
     pub cut_choices: Vec<CutChoice>,
+    /// Further surfaces that the pattern is to fit, with the same vertices.
+    pub also: Vec<Also>,
 }
 
-/// Reads the surface, checks its hash, and turns the cones asked for into vertices.
-pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
-    let (mut import, sha256) = match &request.source {
+/// A further surface.
+pub(crate) struct Also {
+    /// What a person calls it.
+    pub name: String,
+    /// The surface.
+    pub import: Import,
+    /// SHA-256 of the mesh file, hexadecimal.
+    pub sha256: Option<String>,
+}
+
+/// Surfaces at the most that one pattern is fitted to: there are names for so many files.
+pub(crate) const MOST_SURFACES: usize = 9;
+
+impl Loaded {
+    /// All surfaces that the pattern is to fit; `source` is that of the first.
+    pub fn targets(&self, source: &Source) -> Targets {
+        let first = Target::new(title(source), self.import.surface.clone());
+        let further = self.also.iter();
+        let further = further.map(|a| Target::new(a.name.clone(), a.import.surface.clone()));
+        Targets(std::iter::once(first).chain(further).collect())
+    }
+}
+
+/// A surface as it is, with the SHA-256 of its file.
+fn read(source: &Source, options: &ImportOptions) -> Result<(Import, Option<String>), MakeError> {
+    match source {
         Source::Sample(text) => {
             let sample = Sample::parse(text).map_err(MakeError::Sample)?;
-            (
-                sample.import(&request.import).map_err(MakeError::Sample)?,
-                None,
-            )
+            Ok((sample.import(options).map_err(MakeError::Sample)?, None))
         }
         Source::File { path, sha256 } => {
             let name = path.display().to_string();
@@ -60,12 +85,72 @@ pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
                     found,
                 });
             }
-            (
-                import_bytes(&name, &bytes, &request.import).map_err(MakeError::Import)?,
+            Ok((
+                import_bytes(&name, &bytes, options).map_err(MakeError::Import)?,
                 Some(found),
-            )
+            ))
         }
+    }
+}
+
+/// A source as it was given.
+fn named(source: &Source) -> String {
+    match source {
+        Source::Sample(text) => format!("sample:{}", text.trim_start_matches("sample:")),
+        Source::File { path, .. } => path.display().to_string(),
+    }
+}
+
+/// The further surfaces of a request. They take the first one's millimetres per unit, so that how large they are beside
+/// each other stays as it is in the files.
+fn read_also(request: &Request, first: &Import) -> Result<Vec<Also>, MakeError> {
+    let count = 1 + request.also.len();
+    if count > MOST_SURFACES {
+        return Err(MakeError::TooManySurfaces {
+            count,
+            most: MOST_SURFACES,
+        });
+    }
+    let options = ImportOptions {
+        units: Units {
+            unit: Unit::Millimetre,
+            scale: first.report.mm_per_unit,
+            size_mm: None,
+        },
+        ..request.import
     };
+    let titles: Vec<String> = std::iter::once(&request.source)
+        .chain(&request.also)
+        .map(title)
+        .collect();
+    let further = |(n, source): (usize, &Source)| {
+        let (import, sha256) = read(source, &options)?;
+        check_match(
+            (&named(&request.source), &first.surface),
+            (&named(source), &import.surface),
+        )?;
+        // Files of one name in several folders are told apart by their numbers.
+        let number = n + 2;
+        let name = &titles[n + 1];
+        let taken = titles[..=n].contains(name);
+        Ok(Also {
+            name: if taken {
+                format!("{name} ({number})")
+            } else {
+                name.clone()
+            },
+            import,
+            sha256,
+        })
+    };
+    request.also.iter().enumerate().map(further).collect()
+}
+
+/// Reads the surface, checks its hash, and turns the cones asked for into vertices.
+pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
+    let (mut import, sha256) = read(&request.source, &request.import)?;
+    let mut also = read_also(request, &import)?;
+    let before = (!also.is_empty()).then(|| import.surface.clone());
     let mut cones = None;
     let mut cone_choices = None;
     if let ConeWish::Given(wished) = &request.cones {
@@ -103,6 +188,12 @@ pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
         }
         (darts, dart_choices) = (Some(list), Some(choices));
     }
+    if let Some(before) = before {
+        for further in &mut also {
+            let shape = &mut further.import.surface;
+            *shape = follow(shape, &before, &import.surface)?;
+        }
+    }
     let (mut cuts, mut cut_choices) = (Vec::new(), Vec::new());
     for places in &request.cuts {
         let surface = &import.surface;
@@ -132,6 +223,7 @@ pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
         dart_choices,
         cuts,
         cut_choices,
+        also,
     })
 }
 

@@ -4,36 +4,38 @@
 //! the bed) come first, the long solve only when all of that stands. Nothing is written here; [`Made::write`] puts
 //! all files into place at once.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Point3};
 use serde_json::Value;
 
 use super::choose::choose;
 use super::cut::{CutResult, cut};
 use super::design::{
-    ConeChoice, DartChoice, Design, FORMAT, LinkageChoice, SheetChoice, SolveChoice, SurfaceChoice,
+    AlsoChoice, ConeChoice, DartChoice, Design, FORMAT, LinkageChoice, SheetChoice, SolveChoice,
+    SurfaceChoice,
 };
-use super::load::{Loaded, load};
+use super::load::{Also, Loaded, MOST_SURFACES, load};
 use super::maps::cone_opening_mm;
-use super::report::{self, Page, Stroke};
+use super::report::{self, Page, Pose, Stroke};
 use super::request::{Request, Source};
-use super::shape::{Shape, Stock};
+use super::shape::{Fit, Stock, on_shape};
 use super::verdict::{Reason, Verdict};
 use super::{MakeError, tell};
 use crate::base::atomic;
 use crate::base::progress::Progress;
-use crate::conformal::{Cone, Dart, Flattened, Sizing};
+use crate::conformal::{Cone, Dart, Flattened, Layout, Sizing};
 use crate::linkage::write_obj;
 use crate::machine::Machine;
 use crate::material::{CutSetting, Material};
-use crate::mesh::{ClosestPoint, PartChoice, write};
+use crate::mesh::{PartChoice, Surface, write};
 use crate::pattern;
 use crate::rationalize::{Quality, hinge_scales};
 use crate::toolpath::{Role, Toolpath};
 
 /// Names of all files that `make` may write, for replacing an earlier result safely.
-pub const FILES: [&str; 7] = [
+pub const FILES: [&str; 23] = [
     "design.toml",
     "layout.obj",
     "linkage.obj",
@@ -41,7 +43,25 @@ pub const FILES: [&str; 7] = [
     "job.nc",
     "report.json",
     "report.html",
+    "linkage-2.obj",
+    "layout-2.obj",
+    "linkage-3.obj",
+    "layout-3.obj",
+    "linkage-4.obj",
+    "layout-4.obj",
+    "linkage-5.obj",
+    "layout-5.obj",
+    "linkage-6.obj",
+    "layout-6.obj",
+    "linkage-7.obj",
+    "layout-7.obj",
+    "linkage-8.obj",
+    "layout-8.obj",
+    "linkage-9.obj",
+    "layout-9.obj",
 ];
+/// Those of every sheet; linkage and layout on each further surface follow.
+const OWN_FILES: usize = FILES.len() - 2 * (MOST_SURFACES - 1);
 
 /// Everything made, in memory.
 #[derive(Debug)]
@@ -50,15 +70,16 @@ pub struct Made {
     pub design: Design,
     /// May it be cut?
     pub verdict: Verdict,
-    /// Figures of the linkage in space.
-    pub quality: Quality,
+    /// Figures of the linkage on each surface, in their order.
+    pub qualities: Vec<Quality>,
     /// What was noticed and does not forbid the cut.
     pub warnings: Vec<String>,
     /// The result in a few lines, for a person.
     pub summary: Vec<(String, String)>,
     /// All figures.
     pub figures: Value,
-    /// The files, by name: all of [`FILES`], or without pattern and job if the verdict is no.
+    /// The files, by name, of [`FILES`]: without pattern and job if the verdict is no, and linkage and layout on as many
+    /// further surfaces as there are.
     pub files: Vec<(&'static str, Vec<u8>)>,
 }
 
@@ -86,8 +107,9 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     progress.start("reading the surface", None);
     let loaded = load(request)?;
     let surface = &loaded.import.surface;
-    let closest = ClosestPoint::new(surface);
-    let mut shape = choose(request, &loaded, &stock, &closest, progress)?;
+    let targets = loaded.targets(&request.source);
+    targets.check_sizes(stock.sigma)?;
+    let mut shape = choose(request, &loaded, &stock, &targets, progress)?;
     let warnings = tell::warnings(&loaded, &material, &shape, stock.sigma);
 
     // Only a sheet that passes is turned into anything that a machine could run.
@@ -109,10 +131,18 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         removed: shape.removed,
         left_out: &shape.left_out,
         orientation_deg: shape.orientation_deg,
+        shares: &shape.shares,
     };
     let design = decided(request, folder, &loaded, &taken, &stock);
     let figures = tell::figures(&design, &loaded, &shape, job.as_ref(), &warnings);
-    let summary = tell::summary(&material, &machine, &shape, job.as_ref(), stock.sigma);
+    let summary = tell::summary(
+        &material,
+        &machine,
+        &shape,
+        &targets,
+        job.as_ref(),
+        stock.sigma,
+    );
     let drawing = shape
         .sheet
         .as_ref()
@@ -120,24 +150,49 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         .map(pattern::svg);
     let strokes = job.as_ref().map(|job| drawn(&job.toolpath));
     let edge_mm = shape.flat.edge_mm;
-    let distances: Vec<f64> = shape
-        .positions
+    // Of several surfaces each as it was slit, else the one that was mapped, with its own λ.
+    let slit: Vec<&Surface> = match &shape.ground.shapes[..] {
+        [] => vec![&shape.ground.surface],
+        several => several.iter().map(|s| &s.surface).collect(),
+    };
+    let layouts: Vec<Cow<'_, Layout>> = match &shape.ground.shapes[..] {
+        [] => vec![Cow::Borrowed(&shape.flat.layout)],
+        several => several
+            .iter()
+            .map(|s| Cow::Owned(on_shape(&shape.flat.layout, s)))
+            .collect(),
+    };
+    let measured: Vec<(Vec<f64>, Vec<f64>)> = shape
+        .fits
         .iter()
-        .map(|p| closest.query(*p).distance / edge_mm)
+        .zip(&targets.0)
+        .map(|(fit, target)| {
+            let distance = |p: &Point3<f64>| target.closest.query(*p).distance / edge_mm;
+            (
+                fit.positions.iter().map(distance).collect(),
+                hinge_scales(&shape.linkage, &fit.positions),
+            )
+        })
+        .collect();
+    let poses: Vec<Pose<'_>> = (0..shape.fits.len())
+        .map(|n| Pose {
+            name: &targets.0[n].name,
+            surface: slit[n],
+            layout: &layouts[n],
+            positions: &shape.fits[n].positions,
+            distances_in_l: &measured[n].0,
+            openings: &measured[n].1,
+        })
         .collect();
     let page = Page {
         title: &title(&request.source),
         verdict: &shape.verdict,
         summary: &summary,
         warnings: &warnings,
-        surface: &shape.ground.surface,
-        layout: &shape.flat.layout,
         cone_opening_mm: cone_opening_mm(shape.removed, edge_mm),
         linkage: &shape.linkage,
-        positions: &shape.positions,
-        distances_in_l: &distances,
+        poses: &poses,
         distance_limit_in_l: request.accept_distance,
-        openings: &hinge_scales(&shape.linkage, &shape.positions),
         sigma: stock.sigma,
         sheet_svg: drawing.as_deref(),
         toolpath: strokes.as_deref(),
@@ -145,21 +200,22 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     };
     let html = report::html(&page);
     progress.check()?;
-    let layout = write::obj_text(
-        "kagome layout: the surface in mm, vt = conformal layout on the sheet in mm",
-        surface.positions(),
-        surface.faces(),
-        Some(&shape.chart),
-    );
+    let layout = |surface: &Surface| {
+        let text = write::obj_text(
+            "kagome layout: the surface in mm, vt = conformal layout on the sheet in mm",
+            surface.positions(),
+            surface.faces(),
+            Some(&shape.chart),
+        );
+        text.into_bytes()
+    };
+    let linkage = |fit: &Fit| write_obj(&shape.linkage, &fit.positions).into_bytes();
     let report = serde_json::to_string_pretty(&figures)
         .map_err(|e| MakeError::Internal(format!("report.json: {e}")))?;
     let mut files: Vec<(&'static str, Vec<u8>)> = vec![
         ("design.toml", design.to_text()?.into_bytes()),
-        ("layout.obj", layout.into_bytes()),
-        (
-            "linkage.obj",
-            write_obj(&shape.linkage, &shape.positions).into_bytes(),
-        ),
+        ("layout.obj", layout(surface)),
+        ("linkage.obj", linkage(shape.first())),
         ("report.json", (report + "\n").into_bytes()),
         ("report.html", html.into_bytes()),
     ];
@@ -167,13 +223,16 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         files.push(("pattern.svg", drawing.into_bytes()));
         files.push(("job.nc", gcode.into_bytes()));
     }
-    let Shape {
-        verdict, quality, ..
-    } = shape;
+    let further = shape.fits.iter().zip(&targets.0).skip(1);
+    for ((fit, target), names) in further.zip(FILES[OWN_FILES..].chunks(2)) {
+        files.push((names[0], linkage(fit)));
+        files.push((names[1], layout(&target.surface)));
+    }
+    let qualities = shape.fits.into_iter().map(|fit| fit.quality).collect();
     Ok(Made {
         design,
-        verdict,
-        quality,
+        verdict: shape.verdict,
+        qualities,
         warnings,
         summary,
         figures,
@@ -206,6 +265,7 @@ pub(crate) struct Taken<'a> {
     pub removed: usize,
     pub left_out: &'a [u32],
     pub orientation_deg: f64,
+    pub shares: &'a [f64],
 }
 
 /// Every decision, asked for or taken.
@@ -216,9 +276,18 @@ pub(crate) fn decided(
     shape: &Taken<'_>,
     stock: &Stock<'_>,
 ) -> Design {
-    let (file, sample) = match &request.source {
+    let named = |source: &Source| match source {
         Source::File { path, .. } => (Some(relative(path, folder)), None),
         Source::Sample(text) => (None, Some(text.trim_start_matches("sample:").to_owned())),
+    };
+    let (file, sample) = named(&request.source);
+    let further = |(source, also): (&Source, &Also)| {
+        let (file, sample) = named(source);
+        AlsoChoice {
+            file,
+            sample,
+            sha256: also.sha256.clone(),
+        }
     };
     let found = |c: &Cone| ConeChoice {
         vertex: Some(u64::from(c.vertex.0) + 1),
@@ -238,6 +307,7 @@ pub(crate) fn decided(
             mm_per_unit: loaded.import.report.mm_per_unit,
             largest_part: request.import.parts == PartChoice::Largest,
         },
+        also: request.also.iter().zip(&loaded.also).map(further).collect(),
         sheet: SheetChoice {
             material: profile_name(&request.material, folder),
             machine: profile_name(&request.machine, folder),
@@ -254,6 +324,10 @@ pub(crate) fn decided(
             left_out: shape.left_out.to_vec(),
             rim_turnings_deg: shape.flat.singularities.rim_turnings_deg(),
             flaps: request.flaps,
+            shares: match shape.shares {
+                [_] => Vec::new(),
+                shares => shares.to_vec(),
+            },
             straight_rims: shape.flat.singularities.straight_rims(),
         },
         solve: SolveChoice {

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use super::MakeError;
 use super::request::Request;
+use super::targets::{Shaped, Target, spread};
 use crate::base::progress::Progress;
 use crate::conformal::{
-    Cone, ConformalError, Dart, FlattenOptions, Flattened, MetricSolver, Wish, proposals,
-    slit_along, with_cones,
+    Cone, Dart, FlattenOptions, Flattened, MetricSolver, Wish, proposals, slit_along, with_cones,
 };
 use crate::linkage::SeamGuide;
 use crate::mesh::Surface;
@@ -26,10 +26,13 @@ pub(crate) struct Ground {
     pub darts: Vec<Dart>,
     /// Where the seam is to run.
     pub guide: SeamGuide,
+    /// The targets, slit likewise; empty if the surface itself is the only one.
+    pub shapes: Vec<Shaped>,
 }
 
 impl Ground {
-    /// A surface with its darts open.
+    /// A surface with its darts open, for a pattern that is to fit these `targets`: none, or one, if it is to fit the
+    /// surface itself.
     ///
     /// # Errors
     /// [`slit_along`].
@@ -37,18 +40,34 @@ impl Ground {
         surface: &Surface,
         darts: &[Dart],
         guide: &SeamGuide,
-    ) -> Result<Self, ConformalError> {
+        targets: &[Target],
+    ) -> Result<Self, MakeError> {
         let darts = darts.to_vec();
         let surface = if darts.is_empty() {
             surface.clone()
         } else {
-            slit_along(surface, &darts)?
+            slit_along(surface, &darts).map_err(MakeError::Conformal)?
+        };
+        let shaped = |target: &Target| Shaped::new(&target.surface, &surface);
+        let shapes = match targets {
+            [] | [_] => Vec::new(),
+            several => several.iter().map(shaped).collect::<Result<_, _>>()?,
         };
         Ok(Self {
             surface,
             darts,
             guide: guide.clone(),
+            shapes,
         })
+    }
+}
+
+impl Ground {
+    /// The surface that a person is told of: the first target, with the vertices of the one that is mapped.
+    pub fn shown(&self) -> &Surface {
+        self.shapes
+            .first()
+            .map_or(&self.surface, |shape| &shape.surface)
     }
 }
 
@@ -77,7 +96,9 @@ pub(crate) fn maps(
     progress: &dyn Progress,
 ) -> Result<Vec<Map>, MakeError> {
     let surface = &ground.surface;
-    let mut solver = MetricSolver::new(surface).map_err(MakeError::Conformal)?;
+    let mut solver = MetricSolver::new(surface)
+        .map_err(MakeError::Conformal)?
+        .among(spread(&ground.shapes));
     let options = |removal: usize| FlattenOptions {
         sigma,
         sizing: request.sizing,

@@ -17,13 +17,14 @@ pub mod picture;
 pub mod report;
 mod request;
 mod shape;
+mod targets;
 mod tell;
 mod verdict;
 
 use std::path::PathBuf;
 
 pub use design::{
-    ConeChoice, CutChoice, DartChoice, Design, LinkageChoice, SheetChoice, SolveChoice,
+    AlsoChoice, ConeChoice, CutChoice, DartChoice, Design, LinkageChoice, SheetChoice, SolveChoice,
     SurfaceChoice,
 };
 pub use explore::{Explored, explore};
@@ -62,6 +63,50 @@ pub enum MakeError {
         expected: String,
         /// Of the file.
         found: String,
+    },
+    /// A further surface is not the first one's mesh in another shape.
+    #[error(
+        "--also {other} does not match {first}: {difference}. One pattern for several surfaces needs the same mesh in several shapes, with the same vertices and faces in the same order"
+    )]
+    NoMatch {
+        /// The first surface.
+        first: String,
+        /// The further one.
+        other: String,
+        /// What is different, in words.
+        difference: String,
+    },
+    /// Surfaces of sizes that no one sheet has.
+    #[error(
+        "{larger} is {factor:.2} times as large as {smaller} on half of its area, and a sheet of σ = {sigma} cannot be both: σ must be larger, or the files brought nearer to one size"
+    )]
+    SizesApart {
+        /// The larger surface.
+        larger: String,
+        /// The smaller one.
+        smaller: String,
+        /// By what lengths differ.
+        factor: f64,
+        /// The largest stretch.
+        sigma: f64,
+    },
+    /// More surfaces than there are names for their files.
+    #[error("{count} surfaces were asked for; one pattern can be fitted to {most} at the most")]
+    TooManySurfaces {
+        /// As asked.
+        count: usize,
+        /// The largest number.
+        most: usize,
+    },
+    /// Shares of the surfaces that cannot be meant.
+    #[error(
+        "the shares of the surfaces in that which the pattern is laid on are {shares:?}: there must be {surfaces}, from 0 to 1, that sum to 1"
+    )]
+    Shares {
+        /// As given.
+        shares: Vec<f64>,
+        /// Surfaces there are.
+        surfaces: usize,
     },
     /// σ is not a stretch that the pattern can take.
     #[error(

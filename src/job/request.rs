@@ -66,6 +66,10 @@ pub enum FlapWish {
 pub struct Request {
     /// The surface.
     pub source: Source,
+    /// Further surfaces that the same pattern is to fit: the same mesh in other shapes, in the same units.
+    pub also: Vec<Source>,
+    /// Share of each surface in the one that the pattern is laid on; `None`: what fits all of them best.
+    pub shares: Option<Vec<f64>>,
     /// Its units, and which part of it.
     pub import: ImportOptions,
     /// Material profile: a shipped name or a file.
@@ -125,6 +129,8 @@ impl Request {
     pub fn new(source: Source) -> Self {
         Self {
             source,
+            also: Vec::new(),
+            shares: None,
             import: ImportOptions::default(),
             material: crate::material::DEFAULT.into(),
             machine: crate::machine::DEFAULT.into(),

@@ -11,13 +11,14 @@ use nalgebra::{Point2, Point3};
 use super::MakeError;
 use super::maps::{Ground, Map};
 use super::request::{ConeWish, FlapWish, Request};
+use super::targets::{Shaped, Targets};
 use super::verdict::{Verdict, place};
 use crate::base::progress::Progress;
 use crate::base::units::short;
 use crate::conformal::{FlattenOptions, Flattened, Layout, Sizing};
 use crate::linkage::{Built, Flaps, Linkage, LinkageOptions, build_without, fit};
 use crate::machine::Machine;
-use crate::mesh::{ClosestPoint, Surface};
+use crate::mesh::Surface;
 use crate::pattern::{self, PatternError, Sheet};
 use crate::rationalize::{Effort, Quality, STAGE_COUNT, failing, rationalize};
 
@@ -59,14 +60,22 @@ pub(crate) struct Shape {
     pub linkage: Linkage,
     /// The layout's corners there, by face.
     pub chart: Vec<[Point2<f64>; 3]>,
+    /// On each target, in their order.
+    pub fits: Vec<Fit>,
+    /// Whether it may be cut, as far as its shape goes.
+    pub verdict: Verdict,
+    /// Share of each target in the surface that the pattern is laid on.
+    pub shares: Vec<f64>,
+}
+
+/// The linkage on one target.
+pub(crate) struct Fit {
     /// Where the points are in space, millimetres.
     pub positions: Vec<Point3<f64>>,
     /// What the solver did.
     pub effort: Effort,
     /// How good it is.
     pub quality: Quality,
-    /// Whether it may be cut, as far as its shape goes.
-    pub verdict: Verdict,
 }
 
 /// Where a linkage fails by a few triangles only, it is made again without them, so often at the most.
@@ -75,6 +84,9 @@ const MENDED: usize = 4;
 const MOST_SLOTS: usize = 8;
 /// Part of all triangles that may be left out like this.
 const MOST_LEFT_OUT: f64 = 0.015;
+/// The same where one sheet is to fit several surfaces: their outlines are no conformal images of each other, so that
+/// what hangs over the rim of one or the other goes. How much of each is covered is judged in any case.
+const MOST_LEFT_OUT_OF_SEVERAL: f64 = 0.05;
 
 /// Lays a linkage on a map, solves and judges it; where it fails by a few triangles only, it is made once more without
 /// them.
@@ -82,7 +94,7 @@ pub(crate) fn attempt(
     request: &Request,
     map: Map,
     stock: &Stock<'_>,
-    closest: &ClosestPoint,
+    targets: &Targets,
     progress: &dyn Progress,
 ) -> Result<Shape, MakeError> {
     let mut left_out = request.left_out.clone().unwrap_or_default();
@@ -102,12 +114,17 @@ pub(crate) fn attempt(
     let (flat, lattice) = (laid.flat.clone(), laid.lattice);
     let (orientation_deg, distortion) = (laid.orientation_deg, laid.distortion);
     let whole = laid.built.linkage.triangles.len();
-    let first = solve(request, &map, laid, &left_out, stock, closest, progress)?;
+    let first = solve(request, &map, laid, &left_out, stock, targets, progress)?;
     if first.verdict.pass || request.left_out.is_some() {
         return Ok(first);
     }
-    let most = (MOST_LEFT_OUT * whole as f64) as usize;
-    let mut failing = first.failing(request, stock, closest);
+    let part = if targets.several() {
+        MOST_LEFT_OUT_OF_SEVERAL
+    } else {
+        MOST_LEFT_OUT
+    };
+    let most = (part * whole as f64) as usize;
+    let mut failing = first.failing(request, stock, targets);
     for _ in 0..MENDED {
         left_out.extend(&failing);
         left_out.sort_unstable();
@@ -128,11 +145,11 @@ pub(crate) fn attempt(
             orientation_deg,
             distortion,
         };
-        let mended = solve(request, &map, laid, &left_out, stock, closest, progress)?;
+        let mended = solve(request, &map, laid, &left_out, stock, targets, progress)?;
         if mended.verdict.pass {
             return Ok(mended);
         }
-        failing = mended.failing(request, stock, closest);
+        failing = mended.failing(request, stock, targets);
     }
     Ok(first)
 }
@@ -172,7 +189,7 @@ fn solve(
     laid: Laid,
     left_out: &[u32],
     stock: &Stock<'_>,
-    closest: &ClosestPoint,
+    targets: &Targets,
     progress: &dyn Progress,
 ) -> Result<Shape, MakeError> {
     let ground = Arc::clone(&map.ground);
@@ -220,25 +237,49 @@ fn solve(
         .for_each(|t| t.flat = t.flat.map(moved));
     let chart = flat.layout.corners.iter().map(|c| c.map(moved)).collect();
 
-    progress.start("rationalising", Some(STAGE_COUNT));
-    let (positions, effort) = rationalize(
-        &linkage,
-        &built.start,
-        closest,
-        stock.sigma,
-        request.solver,
-        progress,
-    )
-    .map_err(MakeError::Rationalize)?;
-    let quality = Quality::measure(&linkage, &positions, surface, closest, stock.sigma);
-    let verdict = Verdict::judge(
-        &quality,
-        &flat,
-        surface,
-        built.overlaps.len(),
-        request.accept_distance,
-        request.cones == ConeWish::Auto,
-    );
+    let mut fits = Vec::with_capacity(targets.0.len());
+    let mut verdict = Verdict::default();
+    for (n, target) in targets.0.iter().enumerate() {
+        let name = targets.several().then_some(target.name.as_str());
+        let step = name.map_or_else(
+            || "rationalising".to_owned(),
+            |name| format!("rationalising on {name}"),
+        );
+        progress.start(&step, Some(STAGE_COUNT));
+        let shape = ground.shapes.get(n);
+        let start = match shape {
+            Some(shape) => {
+                built.start_on(&shape.surface, &on_shape(&flat.layout, shape), stock.sigma)
+            }
+            None => built.start.clone(),
+        };
+        let (positions, effort) = rationalize(
+            &linkage,
+            &start,
+            &target.closest,
+            stock.sigma,
+            request.solver,
+            progress,
+        )
+        .map_err(MakeError::Rationalize)?;
+        let surface = shape.map_or(surface, |shape| &shape.surface);
+        let quality = Quality::measure(&linkage, &positions, surface, &target.closest, stock.sigma);
+        let judged = Verdict::judge(
+            &quality,
+            &flat,
+            surface,
+            // The sheet is one for all.
+            if n == 0 { built.overlaps.len() } else { 0 },
+            request.accept_distance,
+            request.cones == ConeWish::Auto,
+        );
+        verdict.add(judged, n, name);
+        fits.push(Fit {
+            positions,
+            effort,
+            quality,
+        });
+    }
     Ok(Shape {
         ground: Arc::clone(&ground),
         flat,
@@ -252,11 +293,20 @@ fn solve(
         sheet,
         linkage,
         chart,
-        positions,
-        effort,
-        quality,
+        fits,
         verdict,
+        shares: vec![1.0],
     })
+}
+
+/// A layout with the λ that a shape of its surface asks for.
+pub(crate) fn on_shape(layout: &Layout, shape: &Shaped) -> Layout {
+    let mut layout = layout.clone();
+    layout.spread = None;
+    for (own, more) in layout.log_scale.iter_mut().zip(shape.log_factor.iter()) {
+        *own += more;
+    }
+    layout
 }
 
 /// A lattice laid on a map.
@@ -270,13 +320,32 @@ pub(crate) struct Laid {
 }
 
 impl Shape {
-    /// The numbers of the triangles by which it fails.
-    fn failing(&self, request: &Request, stock: &Stock<'_>, closest: &ClosestPoint) -> Vec<u32> {
+    /// On the first target.
+    pub fn first(&self) -> &Fit {
+        // There is no shape without a target.
+        &self.fits[0]
+    }
+
+    /// The largest distance from any target, in L.
+    pub fn worst_distance(&self) -> f64 {
+        let of = |fit: &Fit| fit.quality.distance_max.value;
+        self.fits.iter().map(of).fold(0.0, f64::max)
+    }
+
+    /// The numbers of the triangles by which it fails, on any target.
+    fn failing(&self, request: &Request, stock: &Stock<'_>, targets: &Targets) -> Vec<u32> {
         let accept = request.accept_distance;
-        failing(&self.linkage, &self.positions, closest, stock.sigma, accept)
-            .into_iter()
+        let numbers: BTreeSet<u32> = self
+            .fits
+            .iter()
+            .zip(&targets.0)
+            .flat_map(|(fit, target)| {
+                let (positions, closest) = (&fit.positions, &target.closest);
+                failing(&self.linkage, positions, closest, stock.sigma, accept)
+            })
             .map(|t| self.built.numbers[t.0 as usize])
-            .collect()
+            .collect();
+        numbers.into_iter().collect()
     }
 }
 

@@ -7,6 +7,7 @@ use super::design::Design;
 use super::load::Loaded;
 use super::maps::Ground;
 use super::shape::Shape;
+use super::targets::Targets;
 use super::verdict::place;
 use crate::base::units::short;
 use crate::conformal::Dart;
@@ -30,6 +31,10 @@ pub(crate) fn warnings(
         .into_iter()
         .map(|r| format!("the mesh was mended: {r}"))
         .collect();
+    for also in &loaded.also {
+        let repairs = also.import.report.repairs().into_iter();
+        warnings.extend(repairs.map(|r| format!("the mesh {} was mended: {r}", also.name)));
+    }
     if sigma > material.sigma.max {
         warnings.push(format!(
             "σ = {} was asked for, but the profile {} says {} ({}): hinges are likely to tear. Cut a small trial first",
@@ -123,7 +128,7 @@ fn seams(shape: &Shape) -> String {
 
 /// The open cuts, if there are any: where they are and what they mean.
 fn darts_in_words(ground: &Ground) -> Option<String> {
-    let at = |v: &VertexId| place(ground.surface.position(*v));
+    let at = |v: &VertexId| place(ground.shown().position(*v));
     let each = |dart: &Dart| match (dart.stops.first(), dart.stops.last()) {
         (Some(a), Some(b)) if a != b => format!("from {} to {}", at(a), at(b)),
         (Some(a), _) => format!("around the handle at {}", at(a)),
@@ -154,10 +159,11 @@ pub(crate) fn summary(
     material: &Material,
     machine: &Machine,
     shape: &Shape,
+    targets: &Targets,
     cut: Option<&CutResult>,
     sigma: f64,
 ) -> Vec<(String, String)> {
-    let (quality, flat) = (&shape.quality, &shape.flat);
+    let flat = &shape.flat;
     let mut lines = vec![
         ("Material".to_owned(), material.title.clone()),
         ("Machine".to_owned(), machine.title.clone()),
@@ -188,28 +194,34 @@ pub(crate) fn summary(
             ),
         ));
     }
-    lines.extend([
-        (
-            "Hinges open".to_owned(),
-            format!(
-                "{} to {} times (σ = {})",
-                short(quality.opening[0], 2),
-                short(quality.opening[2], 2),
-                short(sigma, 3)
-            ),
-        ),
-        (
-            "Distance from the surface".to_owned(),
-            match quality.distance_max.value * quality.edge_mm {
-                mm if mm < 0.001 => "under 0.001 mm".to_owned(),
-                mm => format!(
-                    "at most {} mm ({} of a triangle edge)",
-                    short(mm, 3),
-                    short(quality.distance_max.value, 4),
+    for (fit, target) in shape.fits.iter().zip(&targets.0) {
+        let quality = &fit.quality;
+        if targets.several() {
+            lines.push(("Surface".to_owned(), target.name.clone()));
+        }
+        lines.extend([
+            (
+                "Hinges open".to_owned(),
+                format!(
+                    "{} to {} times (σ = {})",
+                    short(quality.opening[0], 2),
+                    short(quality.opening[2], 2),
+                    short(sigma, 3)
                 ),
-            },
-        ),
-    ]);
+            ),
+            (
+                "Distance from the surface".to_owned(),
+                match quality.distance_max.value * quality.edge_mm {
+                    mm if mm < 0.001 => "under 0.001 mm".to_owned(),
+                    mm => format!(
+                        "at most {} mm ({} of a triangle edge)",
+                        short(mm, 3),
+                        short(quality.distance_max.value, 4),
+                    ),
+                },
+            ),
+        ]);
+    }
     if let Some(cut) = cut {
         lines.push((
             "Job".to_owned(),
@@ -244,8 +256,11 @@ pub(crate) fn figures(
     warnings: &[String],
 ) -> Value {
     let (flat, built) = (&shape.flat, &shape.built);
-    let surface = &shape.ground.surface;
-    let mut distortion = flat.layout.quasi_conformal_error(surface).into_vec();
+    let surface = shape.ground.shown();
+    let mut distortion = flat
+        .layout
+        .quasi_conformal_error(&shape.ground.surface)
+        .into_vec();
     distortion.sort_by(f64::total_cmp);
     let at = |part: f64| {
         distortion
@@ -254,7 +269,8 @@ pub(crate) fn figures(
             .unwrap_or(1.0)
     };
     let sheet = shape.sheet.as_ref().map(Sheet::figures);
-    json!({
+    let first = shape.first();
+    let mut figures = json!({
         "verdict": shape.verdict,
         "warnings": warnings,
         "design": design,
@@ -303,8 +319,8 @@ pub(crate) fn figures(
             "pieces": built.pieces,
             "overlaps_on_sheet": built.overlaps.len(),
         },
-        "solve": { "steps": shape.effort.steps, "factorizations": shape.effort.factorizations },
-        "quality": shape.quality,
+        "solve": { "steps": first.effort.steps, "factorizations": first.effort.factorizations },
+        "quality": first.quality,
         "sheet": sheet.map(|s| json!({
             "flap_triangles": s.flaps,
             "slits": s.slits,
@@ -318,5 +334,18 @@ pub(crate) fn figures(
             "height_mm": s.height_mm,
         })),
         "job": cut.map(CutResult::figures),
-    })
+    });
+    if !loaded.also.is_empty() {
+        let further = shape.fits.iter().skip(1).zip(&loaded.also);
+        let further = further.map(|(fit, also)| {
+            json!({
+                "surface": also.name,
+                "area_mm2": also.import.surface.area(),
+                "solve": { "steps": fit.effort.steps, "factorizations": fit.effort.factorizations },
+                "quality": fit.quality,
+            })
+        });
+        figures["also"] = Value::Array(further.collect());
+    }
+    figures
 }

@@ -19,11 +19,26 @@ pub struct Reason {
     pub text: String,
     /// Where it is on the surface, millimetres, if it is somewhere.
     pub at_mm: Option<[f64; 3]>,
+    /// On which of several surfaces, counted from 0.
+    #[serde(skip_serializing_if = "is_first")]
+    pub surface: usize,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde calls it with a reference"
+)]
+fn is_first(surface: &usize) -> bool {
+    *surface == 0
 }
 
 impl From<String> for Reason {
     fn from(text: String) -> Self {
-        Self { text, at_mm: None }
+        Self {
+            text,
+            at_mm: None,
+            surface: 0,
+        }
     }
 }
 
@@ -48,7 +63,13 @@ impl Verdict {
         cone_tried: bool,
     ) -> Self {
         let mut reasons: Vec<Reason> = Vec::new();
-        let mut say = |at_mm: Option<[f64; 3]>, text: String| reasons.push(Reason { text, at_mm });
+        let mut say = |at_mm: Option<[f64; 3]>, text: String| {
+            reasons.push(Reason {
+                text,
+                at_mm,
+                surface: 0,
+            });
+        };
         let q = quality;
         if q.distance_max.value > accept_distance {
             say(
@@ -140,6 +161,30 @@ impl Verdict {
         Self {
             pass: reasons.is_empty(),
             reasons,
+        }
+    }
+
+    /// Adds what was found on the surface with this number (from 0); `name` is told where there are several.
+    pub(crate) fn add(&mut self, found: Self, surface: usize, name: Option<&str>) {
+        self.pass &= found.pass;
+        self.reasons
+            .extend(found.reasons.into_iter().map(|reason| Reason {
+                text: match name {
+                    Some(name) => format!("on {name}: {}", reason.text),
+                    None => reason.text,
+                },
+                surface,
+                ..reason
+            }));
+    }
+}
+
+impl Default for Verdict {
+    /// Nothing found yet: it passes.
+    fn default() -> Self {
+        Self {
+            pass: true,
+            reasons: Vec::new(),
         }
     }
 }

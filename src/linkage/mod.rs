@@ -80,6 +80,16 @@ pub struct Built {
     pub seam_edges: usize,
     /// Doubled rows along the seam, which are cut but are no part of the linkage.
     pub flaps: Flaps,
+    /// Where the triangles lie on the layout.
+    laid: Vec<clip::Laid>,
+}
+
+impl Built {
+    /// Where every point starts on the surface in another shape (the same faces, moved), opened as the layout's λ asks
+    /// there: millimetres, by point. `layout` is the one that the linkage was built on, with the λ of that shape.
+    pub fn start_on(&self, shape: &Surface, layout: &Layout, sigma: f64) -> Vec<Point3<f64>> {
+        lift::lift(shape, layout, &self.laid, &self.linkage, sigma)
+    }
 }
 
 /// Why there is no linkage.
@@ -216,6 +226,7 @@ pub fn build_without(
         pieces: flat.pieces,
         seam_edges: flat.seam_edges,
         flaps: flat.flaps,
+        laid: kept,
     })
 }
 

@@ -41,22 +41,14 @@ pub struct Page<'a> {
     pub summary: &'a [(String, String)],
     /// What is not wrong but should be known, in words.
     pub warnings: &'a [String],
-    /// The surface, millimetres.
-    pub surface: &'a Surface,
-    /// Its layout; λ is taken from here.
-    pub layout: &'a Layout,
     /// Radius around each cone, on the sheet, in which triangles are removed, millimetres; 0 for none.
     pub cone_opening_mm: f64,
     /// The linkage.
     pub linkage: &'a Linkage,
-    /// Where its points are in space, millimetres, by point.
-    pub positions: &'a [Point3<f64>],
-    /// How far its points are from the surface, in L, by point.
-    pub distances_in_l: &'a [f64],
+    /// The linkage on each surface, in the order of the verdict's.
+    pub poses: &'a [Pose<'a>],
     /// The distance that the verdict allows, in L.
     pub distance_limit_in_l: f64,
-    /// λ at every hinge.
-    pub openings: &'a [f64],
     /// The largest λ that the material allows.
     pub sigma: f64,
     /// `pattern.svg`, if there is one.
@@ -65,6 +57,23 @@ pub struct Page<'a> {
     pub toolpath: Option<&'a [Stroke]>,
     /// `report.json`.
     pub figures: &'a serde_json::Value,
+}
+
+/// The linkage on one surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Pose<'a> {
+    /// Name of the surface; told where there are several.
+    pub name: &'a str,
+    /// The surface, millimetres.
+    pub surface: &'a Surface,
+    /// Its layout; λ is taken from here.
+    pub layout: &'a Layout,
+    /// Where the linkage's points are in space, millimetres, by point.
+    pub positions: &'a [Point3<f64>],
+    /// How far they are from the surface, in L, by point.
+    pub distances_in_l: &'a [f64],
+    /// λ at every hinge.
+    pub openings: &'a [f64],
 }
 
 /// Sizes of the pictures, pixels. All together a page stays within 2 MB for a surface of 20 000 faces.
@@ -82,22 +91,25 @@ pub fn html(page: &Page<'_>) -> String {
     verdict(&mut out, page);
     summary(&mut out, page.summary);
     warnings(&mut out, page);
-    let places: Vec<(usize, Point3<f64>)> = page
-        .verdict
-        .reasons
-        .iter()
-        .enumerate()
-        .filter_map(|(i, r)| r.at_mm.map(|p| (i + 1, Point3::from(p))))
-        .collect();
-    let map = Stretch {
-        surface: page.surface,
-        layout: page.layout,
-        cone_opening_mm: page.cone_opening_mm,
-        sigma: page.sigma,
-    };
-    stretch(&mut out, &map, &places);
-    linkage(&mut out, page, &places);
-    hinges(&mut out, page);
+    for (n, pose) in page.poses.iter().enumerate() {
+        let reasons = page.verdict.reasons.iter().enumerate();
+        let places: Vec<(usize, Point3<f64>)> = reasons
+            .filter(|(_, r)| r.surface == n)
+            .filter_map(|(i, r)| r.at_mm.map(|p| (i + 1, Point3::from(p))))
+            .collect();
+        if page.poses.len() > 1 {
+            let _ = writeln!(out, "<h2 class=\"pose\">On {}</h2>", escape(pose.name));
+        }
+        let map = Stretch {
+            surface: pose.surface,
+            layout: pose.layout,
+            cone_opening_mm: page.cone_opening_mm,
+            sigma: page.sigma,
+        };
+        stretch(&mut out, &map, &places);
+        linkage(&mut out, page, pose, &places);
+        hinges(&mut out, page, pose);
+    }
     sheet(&mut out, page);
     toolpath(&mut out, page);
     foot(&mut out, page.figures);
@@ -241,9 +253,9 @@ fn stretch(out: &mut String, map: &Stretch<'_>, places: &[(usize, Point3<f64>)])
     );
 }
 
-fn linkage(out: &mut String, page: &Page<'_>, places: &[(usize, Point3<f64>)]) {
-    let around = views::around(View::front(page.surface));
-    let scene = Scene::linkage(page.surface, page.linkage, page.positions);
+fn linkage(out: &mut String, page: &Page<'_>, pose: &Pose<'_>, places: &[(usize, Point3<f64>)]) {
+    let around = views::around(View::front(pose.surface));
+    let scene = Scene::linkage(pose.surface, page.linkage, pose.positions);
     let _ = write!(
         out,
         "<section><h2>The opened sheet</h2><p class=\"lead\">{} rigid triangles of {} mm, joined at {} hinges, as they will stand in space. The pale body is the surface.</p><div class=\"grid two\">{}</div></section>",
@@ -262,7 +274,7 @@ fn linkage(out: &mut String, page: &Page<'_>, places: &[(usize, Point3<f64>)]) {
         )
     );
     let scale = ColourScale::distance(page.distance_limit_in_l);
-    let scene = Scene::linkage_by_value(page.linkage, page.positions, page.distances_in_l, &scale);
+    let scene = Scene::linkage_by_value(page.linkage, pose.positions, pose.distances_in_l, &scale);
     let _ = write!(
         out,
         "<section><h2>Distance from the surface</h2><p class=\"lead\">How far the corners of the triangles are from the surface, in triangle edges (L = {} mm).</p><div class=\"key\">{}</div><div class=\"grid\">{}</div></section>",
@@ -289,13 +301,13 @@ fn linkage(out: &mut String, page: &Page<'_>, places: &[(usize, Point3<f64>)]) {
     );
 }
 
-fn hinges(out: &mut String, page: &Page<'_>) {
+fn hinges(out: &mut String, page: &Page<'_>, pose: &Pose<'_>) {
     let scale = ColourScale::scale_factor(page.sigma);
     let _ = write!(
         out,
         "<section><h2>Hinges</h2><p class=\"lead\">How far each of the {} hinges is open, from closed (1) to the limit of the material (σ).</p><figure>{}</figure></section>",
-        page.openings.len(),
-        histogram(page.openings, &scale)
+        pose.openings.len(),
+        histogram(pose.openings, &scale)
     );
 }
 

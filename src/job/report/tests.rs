@@ -65,25 +65,30 @@ fn with_page<T>(full: bool, then: impl FnOnce(&Page<'_>) -> T) -> T {
         reasons: vec![Reason {
             text: "the <tip> is 1.89 L away".into(),
             at_mm: (!full).then_some([0.0; 3]),
+            surface: 0,
         }],
     };
     let strokes = [Stroke {
         role: Role::Cut,
         points: vec![Point2::new(0.0, 0.0), Point2::new(5.0, 5.0)],
     }];
+    let pose = Pose {
+        name: "dish",
+        surface: &job.surface,
+        layout: &job.layout,
+        positions: &job.built.start,
+        distances_in_l: &vec![0.01; job.built.start.len()],
+        openings: &vec![1.2; job.built.linkage.hinges.len()],
+    };
     then(&Page {
         title: "dish & \"bowl\" <1>",
         verdict: &verdict,
         summary: &[("sheet".into(), "90 × 80 mm & more".into())],
         warnings: &["σ is an <estimate>".into()],
-        surface: &job.surface,
-        layout: &job.layout,
         cone_opening_mm: 0.0,
         linkage: &job.built.linkage,
-        positions: &job.built.start,
-        distances_in_l: &vec![0.01; job.built.start.len()],
+        poses: &[pose],
         distance_limit_in_l: 0.1,
-        openings: &vec![1.2; job.built.linkage.hinges.len()],
         sigma: 2.0,
         sheet_svg: full.then_some(SHEET),
         toolpath: full.then_some(&strokes),
@@ -167,6 +172,37 @@ fn the_page_fetches_nothing_and_runs_nothing() {
     }
 }
 
+/// Each of several surfaces has its own pictures and only its own rings.
+#[test]
+fn every_surface_is_shown_with_its_own_places() {
+    let html = with_page(false, |page| {
+        let reason = |surface| Reason {
+            surface,
+            ..page.verdict.reasons[0].clone()
+        };
+        let verdict = Verdict {
+            pass: false,
+            reasons: vec![reason(1), reason(1)],
+        };
+        let second = Pose {
+            name: "a <second>",
+            ..page.poses[0]
+        };
+        html(&Page {
+            verdict: &verdict,
+            poses: &[page.poses[0], second],
+            ..*page
+        })
+    });
+    assert_balanced(&html);
+    let (first, second) = html.split_once("On a &lt;second&gt;").unwrap();
+    assert!(first.contains("On dish"));
+    let pictures = |part: &str| part.matches("<img").count();
+    assert_eq!(pictures(first), pictures(second));
+    assert!(!first.contains("<circle cx"), "no ring on the first");
+    assert!(second.contains("<circle cx"));
+}
+
 #[test]
 fn the_same_job_gives_the_same_bytes() {
     assert!(with_page(true, html) == with_page(true, html));
@@ -176,9 +212,12 @@ fn the_same_job_gives_the_same_bytes() {
 fn lists_that_are_too_short_leave_things_out_and_do_not_fail() {
     let html = with_page(true, |page| {
         html(&Page {
-            positions: &page.positions[..5],
-            distances_in_l: &[],
-            openings: &[],
+            poses: &[Pose {
+                positions: &page.poses[0].positions[..5],
+                distances_in_l: &[],
+                openings: &[],
+                ..page.poses[0]
+            }],
             sheet_svg: Some("no drawing"),
             toolpath: Some(&[]),
             sigma: f64::NAN,
