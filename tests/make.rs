@@ -400,7 +400,9 @@ fn a_bump_without_its_cone_gets_a_report_but_no_job() {
     assert!(
         words.contains("misses the surface")
             && words.contains("mm) at (")
-            && words.contains("--cone"),
+            && words.contains("--cone")
+            && words.contains("open to σ = 2")
+            && words.contains("would miss by"),
         "{words}"
     );
     let out = folder.path().join("out");
@@ -423,6 +425,34 @@ fn a_bump_without_its_cone_gets_a_report_but_no_job() {
         2.0,
     );
     assert!(found.edge_error < 1e-12 && found.distance > 0.3);
+    // The σ that it says would do, does; a little less does not.
+    let shallow = |sigma: &str, out: &str| {
+        kagome(
+            &[
+                "make",
+                "sample:cap",
+                "-q",
+                "-o",
+                out,
+                "--cone",
+                "none",
+                "--edge",
+                "9",
+                "--sigma",
+                sigma,
+            ],
+            folder.path(),
+        )
+    };
+    let words = stderr(&shallow("1.2", "narrow"));
+    let (_, after) = words
+        .split_once("material of σ = ")
+        .unwrap_or_else(|| panic!("{words}"));
+    let least: f64 = after.split_whitespace().next().unwrap().parse().unwrap();
+    assert!(
+        least > 1.2 && least < 1.4,
+        "a cap of 60° asks for 4/3: {words}"
+    );
     // With --accept-distance the one threshold of taste is relaxed, the others are not.
     let output = kagome(
         &[

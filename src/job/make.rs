@@ -22,7 +22,7 @@ use super::report::{self, Page, Pose, Stroke};
 use super::request::{Request, Source};
 use super::shape::{Fit, Stock, on_shape};
 use super::verdict::{Reason, Verdict};
-use super::{MakeError, tell};
+use super::{MakeError, remedy, tell};
 use crate::base::atomic;
 use crate::base::progress::Progress;
 use crate::conformal::{Cone, Dart, Flattened, Layout, Sizing};
@@ -31,7 +31,7 @@ use crate::machine::Machine;
 use crate::material::{CutSetting, Material};
 use crate::mesh::{PartChoice, Surface, write};
 use crate::pattern;
-use crate::rationalize::{Quality, hinge_scales};
+use crate::rationalize::{Quality, Solver, hinge_scales};
 use crate::toolpath::{Role, Toolpath};
 
 /// Names of all files that `make` may write, for replacing an earlier result safely.
@@ -110,6 +110,9 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     let targets = loaded.targets(&request.source);
     targets.check_sizes(stock.sigma)?;
     let mut shape = choose(request, &loaded, &stock, &targets, progress)?;
+    if !shape.verdict.pass && request.solver == Solver::Exact {
+        remedy::explain(request, &mut shape, &stock, &targets, progress)?;
+    }
     let warnings = tell::warnings(&loaded, &material, &shape, stock.sigma);
 
     // Only a sheet that passes is turned into anything that a machine could run.

@@ -14,6 +14,7 @@ mod make;
 mod map_figures;
 mod maps;
 pub mod picture;
+mod remedy;
 pub mod report;
 mod request;
 mod shape;
