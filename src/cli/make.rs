@@ -18,6 +18,7 @@ use crate::rationalize::Solver;
   kagome make sample:mask
   kagome make scan.obj --size 220 --material plywood-3 --triangles 2000 -o scan-sheet
   kagome make scan.stl --cone v1200 --remove 16 --sigma 1.6
+  kagome make face.obj --also smile.obj --size 250 --triangles 2500
   kagome make scan-sheet/design.toml -o again
 
 SURFACE may be a mesh (OBJ, STL, PLY), sample:NAME (see `kagome samples list`), or a design.toml that an
@@ -25,7 +26,8 @@ earlier run wrote; a design brings every decision with it, and only -o, --force 
 pub struct MakeArgs {
     #[command(flatten)]
     surface: SurfaceArgs,
-    /// A further surface that the same sheet is to fit: the same mesh in another shape, in the same units; repeatable
+    /// A further surface that the same sheet is to fit: the same mesh in another shape, which takes the first one's
+    /// millimetres per unit; repeatable
     #[arg(long, value_name = "SURFACE")]
     also: Vec<String>,
     /// Directory for the results; it appears complete or not at all [default: the surface's name]

@@ -220,8 +220,12 @@ fn stretch_advice(flat: &Flattened, surface: &Surface, sigma: f64, cone_tried: b
             short(at.z, 1)
         )
     };
+    let who = match flat.layout.spread {
+        Some(_) => "The surfaces together ask",
+        None => "The surface asks",
+    };
     format!(
-        "The surface asks for a stretch of {} at {}, σ is {}: {help}",
+        "{who} for a stretch of {} at {}, σ is {}: {help}",
         short(needed, 2),
         place(at),
         short(sigma, 3),
