@@ -14,6 +14,7 @@ pub mod ports;
 pub mod samples;
 pub mod send;
 pub mod sim;
+pub mod states;
 pub mod surface_args;
 mod terminal;
 pub mod verify;
@@ -59,6 +60,8 @@ enum Verb {
     Flatten(Box<flatten::FlattenArgs>),
     /// Show what a surface is like (topology, size, curvature, defects), or a linkage.obj (hinges, how it can move)
     Inspect(Box<inspect::InspectArgs>),
+    /// Open and close a linkage.obj, or go from one state of it to another: a sequence of OBJ, and a glTF that plays it
+    States(states::StatesArgs),
     /// List the sample surfaces, or write one as a file
     Samples(samples::SamplesArgs),
     /// List, show and check machines
@@ -105,6 +108,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Verb::Flatten(args) => flatten::run(args, global, &terminal),
         Verb::Verify(args) => verify::run(args, global, &terminal),
         Verb::Inspect(args) => inspect::run(args, global, &terminal),
+        Verb::States(args) => states::run(args, global, &terminal),
         Verb::Samples(args) => samples::run(args, global, &terminal),
         Verb::Materials(args) => materials::run(args, global, &terminal),
         Verb::Machines(args) => machines::run(args, global, &terminal),

@@ -17,6 +17,7 @@ pub mod picture;
 pub mod report;
 mod request;
 mod shape;
+mod states;
 mod tell;
 mod verdict;
 
@@ -33,6 +34,7 @@ pub use map_figures::{ConeFigures, MapFigures};
 pub use request::{
     ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, FlapWish, Request, Source,
 };
+pub use states::{Opening, StateFigures, StateFiles};
 pub use verdict::{COVERAGE_WANTED, EDGE_TOLERANCE, Reason, Verdict};
 
 use crate::base::catalog::CatalogError;

@@ -3,7 +3,8 @@
 //! [`rationalize`] runs one of two solvers from the opened lift: [`Solver::Exact`] (all conditions to rounding) or
 //! [`Solver::Projection`] (the paper's, for preview and comparison). [`Quality`] measures the result independently of
 //! either, [`Soundness`] the part of it that needs no surface. [`freedom()`] counts and finds the degrees of freedom that
-//! a linkage has left, [`softest`] the motions that cost least.
+//! a linkage has left, [`softest`] the motions that cost least. [`opening_path`] opens and closes one linkage, state by
+//! state.
 
 mod exact;
 mod freedom;
@@ -13,6 +14,7 @@ mod overlap;
 mod problem;
 mod projection;
 mod quality;
+mod states;
 
 use nalgebra::{Point3, Vector3};
 
@@ -22,6 +24,10 @@ pub use motion::{MOST_MOTIONS, Motion, motions_obj, softest};
 pub use overlap::OVERLAP_TOLERANCE;
 pub use problem::Problem;
 pub use quality::{Quality, SIGMA_TOLERANCE, Soundness, Worst, failing};
+pub use states::{
+    EXACT_EDGES, MOST_STEPS, REACHED, State, StatePath, StatesError, check_same, open_share,
+    opening_path, path_between,
+};
 
 use crate::base::progress::{Interrupted, Progress};
 use crate::base::sparse::FactorError;
