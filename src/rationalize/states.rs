@@ -25,7 +25,7 @@ use crate::linkage::{Linkage, write_obj};
 pub const EXACT_EDGES: f64 = 1e-9;
 
 /// The mean opening is met when it is not off by more than this.
-const MET: f64 = 2e-5;
+const MET: f64 = 5e-5;
 
 /// … and near enough when corrections do not get it nearer: a solve ends when there is little to gain, each a little
 /// elsewhere.
@@ -38,15 +38,18 @@ pub const REACHED: f64 = 1.5e-4;
 const ROUNDING: f64 = 1e-9;
 
 /// Longest step of the mean opening.
-const LONGEST: f64 = 0.05;
+const LONGEST: f64 = 0.1;
 
-/// Shortest step: where not even this succeeds, the path ends.
+/// On the way it may be off by this part of the step.
+const LOOSE: f64 = 0.25;
+
+/// Shortest step: where not even this succeeds, or gains so much, the path ends.
 const SHORTEST: f64 = 0.002;
 
 /// Corrections of what the hinges are drawn to, for one step.
 const CORRECTIONS: usize = 5;
 
-/// From this mean opening the sheet may be laid down closed.
+/// From this mean opening a sheet without seams is laid down closed.
 const NEARLY_CLOSED: f64 = 1.01;
 
 /// Solves for one step between two given states at the most.
@@ -238,7 +241,7 @@ pub fn path_between(
     progress.start("states", Some(steps as u64 + 1));
     let problem = Problem::new(linkage, sigma);
     let shapes = [a, b].map(|x| Shape::of(linkage, &problem, x));
-    let strides = shapes[0].distance(&shapes[1]) / (LONGEST * steps as f64);
+    let strides = shapes[0].distance(&shapes[1]) / (0.5 * LONGEST * steps as f64);
     let strides = strides.ceil().clamp(1.0, MOST_STRIDES) as usize;
     let mut effort = Effort::default();
     let mut states = vec![State::new(linkage, a.to_vec(), None, sigma)];
@@ -397,40 +400,52 @@ impl<'a> Walk<'a> {
 
     /// Goes to a mean opening, or as near as it can, and tells whether it got there.
     fn go(&mut self, asked: f64, progress: &dyn Progress) -> Result<bool, RationalizeError> {
+        let flat = if asked <= 1.0 { self.flat() } else { None };
+        let goal = if flat.is_some() { NEARLY_CLOSED } else { asked };
         let mut stride = LONGEST;
-        while (asked - self.mean).abs() > MET {
-            let way = asked - self.mean;
-            if asked <= 1.0 && self.mean < NEARLY_CLOSED && self.lay_down() {
-                return Ok(true);
-            }
-            let next = if way.abs() > stride {
-                self.mean + stride.copysign(way)
-            } else {
-                asked
-            };
-            if self.step(next, progress)? {
-                if next == asked {
-                    break;
-                }
-                stride = LONGEST.min(1.5 * stride);
-            } else {
-                stride = 0.5 * stride.min(way.abs());
-                if stride < SHORTEST {
-                    break;
+        while (goal - self.mean).abs() > MET && !(flat.is_some() && self.mean < goal) {
+            let way = goal - self.mean;
+            let on_the_way = way.abs() > stride || flat.is_some();
+            let next = self.mean + stride.min(way.abs()).copysign(way);
+            let next = if way.abs() > stride { next } else { goal };
+            match self.step(next, on_the_way, progress)? {
+                Step::Arrived if next == goal => break,
+                Step::Arrived => stride = LONGEST.min(1.5 * stride),
+                Step::Bounded(gained) if gained < SHORTEST => break,
+                Step::Bounded(_) => {}
+                Step::Failed => {
+                    stride = 0.5 * stride.min(way.abs());
+                    if stride < SHORTEST {
+                        break;
+                    }
                 }
             }
+        }
+        if let Some(flat) = flat
+            && self.mean < 1.5 * (NEARLY_CLOSED - 1.0) + 1.0
+        {
+            self.x = aligned(&flat, &self.x);
+            self.mean = mean(&hinge_scales(self.linkage, &self.x));
+            self.lead = 0.0;
         }
         Ok((asked - self.mean).abs() <= REACHED)
     }
 
-    /// One solve, or a few until the mean is met. Goes nowhere if that fails.
-    fn step(&mut self, asked: f64, progress: &dyn Progress) -> Result<bool, RationalizeError> {
+    /// One solve, or a few until the mean is met; `on_the_way` about is enough. Goes nowhere if that fails.
+    fn step(
+        &mut self,
+        asked: f64,
+        on_the_way: bool,
+        progress: &dyn Progress,
+    ) -> Result<Step, RationalizeError> {
         let sigma = self.problem.sigma;
+        let way = (asked - self.mean).abs();
+        let enough = if on_the_way { LOOSE * way } else { MET };
         let mut drawn = (asked + self.lead).clamp(1.0, sigma);
         let mut x = self.x.clone();
         let mut before: Option<(f64, f64)> = None;
-        // (how far off, positions, mean, drawn to)
-        let mut best: Option<(f64, Vec<Point3<f64>>, f64, f64)> = None;
+        let mut best: Option<Found> = None;
+        let mut bounded = false;
         for _ in 0..CORRECTIONS {
             let wanted = self.drawn_to(drawn);
             let (found, effort) = wanted.solve(self.linkage, &self.problem, &x, progress)?;
@@ -447,26 +462,37 @@ impl<'a> Walk<'a> {
                 }
                 _ => 1.0,
             };
-            if best.as_ref().is_none_or(|(least, ..)| off.abs() < *least) {
-                best = Some((off.abs(), found.clone(), mean, drawn));
+            if best.as_ref().is_none_or(|b| off.abs() < b.off) {
+                best = Some(Found {
+                    off: off.abs(),
+                    x: found.clone(),
+                    mean,
+                    drawn,
+                });
             }
             let next = (drawn - off / slope).clamp(1.0, sigma);
-            if off.abs() <= MET || next == drawn {
+            bounded = next == drawn;
+            if off.abs() <= enough || bounded {
                 break;
             }
             before = Some((drawn, mean));
             drawn = next;
             x = found;
         }
-        match best {
-            Some((off, x, mean, drawn)) if off <= NEAR => {
-                self.x = aligned(&x, &self.x);
-                self.mean = mean;
-                self.lead = drawn - mean;
-                Ok(true)
-            }
-            _ => Ok(false),
-        }
+        let Some(best) = best else {
+            return Ok(Step::Failed);
+        };
+        let step = if best.off <= enough.max(NEAR) {
+            Step::Arrived
+        } else if bounded && best.off < way {
+            Step::Bounded(way - best.off)
+        } else {
+            return Ok(Step::Failed);
+        };
+        self.x = aligned(&best.x, &self.x);
+        self.mean = best.mean;
+        self.lead = best.drawn - best.mean;
+        Ok(step)
     }
 
     /// A shape with this mean opening, between that of the start and a flat one, closed or open to σ.
@@ -492,14 +518,14 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Lays a linkage that is nearly closed down on its sheet, if that has no seams.
-    fn lay_down(&mut self) -> bool {
+    /// The closed sheet, if all of the linkage can be laid down on it: it is one piece and has no seams.
+    fn flat(&self) -> Option<Vec<Point3<f64>>> {
         let mut sets = Union::new(self.linkage.triangles.len());
         let joined = self.linkage.hinges.iter();
         let joined = joined.filter(|h| sets.join(h.ccw.triangle.index(), h.cw.triangle.index()));
         let pieces = self.linkage.triangles.len() - joined.count();
         if pieces > 1 || self.linkage.hinges.iter().any(|h| h.seam) {
-            return false;
+            return None;
         }
         let mut flat = vec![Point3::origin(); self.x.len()];
         for t in self.linkage.triangles.iter() {
@@ -507,14 +533,27 @@ impl<'a> Walk<'a> {
                 flat[p.index()] = Point3::new(at.x, at.y, 0.0);
             }
         }
-        if !sound(&Soundness::measure(self.linkage, &flat, self.problem.sigma)) {
-            return false;
-        }
-        self.x = aligned(&flat, &self.x);
-        self.mean = mean(&hinge_scales(self.linkage, &self.x));
-        self.lead = 0.0;
-        true
+        let q = Soundness::measure(self.linkage, &flat, self.problem.sigma);
+        sound(&q).then_some(flat)
     }
+}
+
+/// What came of a step.
+enum Step {
+    /// It is where it was to go.
+    Arrived,
+    /// Its hinges are drawn as far as they can be, and it is not there; it came so much nearer.
+    Bounded(f64),
+    /// It is where it was.
+    Failed,
+}
+
+/// A solution, how far off it is, and what the hinges were drawn to in the mean.
+struct Found {
+    off: f64,
+    x: Vec<Point3<f64>>,
+    mean: f64,
+    drawn: f64,
 }
 
 /// What the hinges of a linkage are like, which is its shape but for where it lies.
