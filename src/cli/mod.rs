@@ -15,6 +15,7 @@ pub mod pose;
 pub mod samples;
 pub mod send;
 pub mod sim;
+pub mod states;
 pub mod surface_args;
 mod terminal;
 pub mod verify;
@@ -62,6 +63,8 @@ enum Verb {
     Inspect(Box<inspect::InspectArgs>),
     /// Move a linkage by handles and make it exact again
     Pose(pose::PoseArgs),
+    /// Open and close a linkage.obj, or go from one state of it to another: a sequence of OBJ, and a glTF that plays it
+    States(states::StatesArgs),
     /// List the sample surfaces, or write one as a file
     Samples(samples::SamplesArgs),
     /// List, show and check machines
@@ -109,6 +112,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Verb::Verify(args) => verify::run(args, global, &terminal),
         Verb::Inspect(args) => inspect::run(args, global, &terminal),
         Verb::Pose(args) => pose::run(args, global, &terminal),
+        Verb::States(args) => states::run(args, global, &terminal),
         Verb::Samples(args) => samples::run(args, global, &terminal),
         Verb::Materials(args) => materials::run(args, global, &terminal),
         Verb::Machines(args) => machines::run(args, global, &terminal),

@@ -18,6 +18,7 @@ mod remedy;
 pub mod report;
 mod request;
 mod shape;
+mod states;
 mod targets;
 mod tell;
 mod verdict;
@@ -35,6 +36,7 @@ pub use map_figures::{ConeFigures, MapFigures};
 pub use request::{
     ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, FlapWish, Request, Source,
 };
+pub use states::{Opening, StateFigures, StateFiles};
 pub use verdict::{COVERAGE_WANTED, EDGE_TOLERANCE, Reason, Verdict};
 
 use crate::base::catalog::CatalogError;

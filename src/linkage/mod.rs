@@ -10,6 +10,7 @@
 mod clip;
 mod continuity;
 mod flaps;
+mod gltf;
 mod guide;
 mod lattice;
 mod lift;
@@ -28,6 +29,7 @@ pub use continuity::{Fitted, fit};
 #[cfg(test)]
 pub(crate) use flaps::tests::cylinder as cylinder_with_flaps;
 pub use flaps::{Flap, Flaps, SeamSegment};
+pub use gltf::write_glb;
 pub use guide::SeamGuide;
 pub use lattice::Lattice;
 pub use lift::opening_turn;

@@ -5,7 +5,8 @@
 //! [`Quality`] measures the result independently of either, [`Soundness`] the part of it that needs no surface,
 //! [`Bounds`] what holds a linkage back at a place. [`freedom()`] counts and finds the degrees of freedom that a linkage
 //! has left, [`softest`] the motions that cost least. A [`Session`] poses a linkage by handles, frame by frame;
-//! [`pose`] reads poses from a file, [`settle`] makes them exact.
+//! [`pose`] reads poses from a file, [`settle`] makes them exact. [`opening_path`] opens and closes one linkage, state by
+//! state.
 
 mod bounds;
 mod exact;
@@ -18,6 +19,7 @@ mod problem;
 mod projection;
 mod quality;
 pub mod session;
+mod states;
 
 use nalgebra::{Point3, Vector3};
 
@@ -30,6 +32,10 @@ pub use problem::Problem;
 pub use projection::{AlternatingProjection, Closeness, ProjectionOptions, Rest, Separation};
 pub use quality::{Quality, SIGMA_TOLERANCE, Soundness, Worst, failing};
 pub use session::{Edit, EditError, Hold, Session, Step};
+pub use states::{
+    EXACT_EDGES, MOST_STEPS, REACHED, State, StatePath, StatesError, check_same, open_share,
+    opening_path, path_between,
+};
 
 use crate::base::progress::{Interrupted, Progress};
 use crate::base::sparse::FactorError;

@@ -41,18 +41,24 @@ impl Contact {
                 Some((value, [h, b, a, c]))
             }
             Kind::Facing(side) => {
-                let (u, v, w) = (p[1] - p[0], p[2] - p[0], p[3] - p[0]);
-                let normal = u.cross(&v);
-                let length = normal.norm();
-                let n = normal.try_normalize(1e-12)?;
-                let value = n.dot(&w);
-                let q = (w - n * value) / length;
-                let (du, dv) = (v.cross(&q), q.cross(&u));
-                let gradient = [-(du + dv + n), du, dv, n];
+                let (value, gradient) = off_plane(&p)?;
                 Some((side * value, gradient.map(|g| g * side)))
             }
         }
     }
+}
+
+/// How far the last of four points is off the plane of the others, on the side that they turn counter-clockwise seen from,
+/// and the gradient; `None` where they have collapsed.
+pub(super) fn off_plane(p: &[Vector3<f64>; 4]) -> Option<(f64, [Vector3<f64>; 4])> {
+    let (u, v, w) = (p[1] - p[0], p[2] - p[0], p[3] - p[0]);
+    let normal = u.cross(&v);
+    let length = normal.norm();
+    let n = normal.try_normalize(1e-12)?;
+    let value = n.dot(&w);
+    let q = (w - n * value) / length;
+    let (du, dv) = (v.cross(&q), q.cross(&u));
+    Some((value, [-(du + dv + n), du, dv, n]))
 }
 
 /// Contacts that part all triangles that cross at `x` (in L).

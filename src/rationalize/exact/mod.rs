@@ -18,11 +18,13 @@
 //! get conditions of their own ([`contact`]), and the last stages run again.
 
 mod contact;
+mod opening;
 mod system;
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use self::contact::{Contact, contacts};
+pub(crate) use self::opening::{Bends, Openings, bends};
 use self::system::System;
 use super::RationalizeError;
 use super::problem::{CONDITIONS, Problem, hinge_violations};
@@ -41,6 +43,15 @@ pub struct Effort {
     pub analyses: usize,
 }
 
+impl Effort {
+    /// Adds that of another solve.
+    pub(crate) fn add(&mut self, other: Self) {
+        self.steps += other.steps;
+        self.factorizations += other.factorizations;
+        self.analyses += other.analyses;
+    }
+}
+
 /// What draws the points.
 #[derive(Clone, Copy)]
 pub(crate) enum Target<'a> {
@@ -48,6 +59,8 @@ pub(crate) enum Target<'a> {
     Surface(&'a ClosestPoint),
     /// A place of its own for each point (millimetres), with a weight from 0 to 1.
     Places(&'a [(Point3<f64>, f64)]),
+    /// A scale factor and bends for each hinge.
+    Openings(Openings<'a>),
 }
 
 /// One stage of the continuation.
@@ -190,12 +203,15 @@ impl<'a> Solver<'a> {
         let near: Vec<bool> = problem
             .hinges
             .iter()
-            .map(|h| slack(problem, &h.map(|i| x[i as usize])) < NEAR)
+            .map(|h| {
+                matches!(target, Target::Openings(_))
+                    || slack(problem, &h.map(|i| x[i as usize])) < NEAR
+            })
             .collect();
         let system = System::new(problem, &near, &[])?;
         let tracker = match target {
             Target::Surface(closest) => Some(ClosestTracker::new(closest, x.len())),
-            Target::Places(_) => None,
+            Target::Places(_) | Target::Openings(_) => None,
         };
         let none = Draw {
             along: Vector3::zeros(),
@@ -304,6 +320,8 @@ impl<'a> Solver<'a> {
                     };
                 }
             }
+            // Hinges are drawn, not points.
+            Target::Openings(_) => {}
         }
     }
 
@@ -333,8 +351,14 @@ impl<'a> Solver<'a> {
         let target = stage.weight * stage.weight;
         let proximal = target * PROXIMAL * PROXIMAL;
         for ((x, begin), draw) in x.iter().zip(&self.begin).zip(&self.trial_draws) {
-            sum += 2.0 * target * stiffened(draw.distance).value
-                + proximal * (x - begin).norm_squared();
+            let off = match self.target {
+                Target::Surface(_) => 2.0 * stiffened(draw.distance).value,
+                Target::Places(_) | Target::Openings(_) => draw.distance * draw.distance,
+            };
+            sum += target * off + proximal * (x - begin).norm_squared();
+        }
+        if let Target::Openings(wanted) = &self.target {
+            sum += target * opening::misfit(self.problem, wanted, x);
         }
         0.5 * sum
     }
@@ -414,9 +438,13 @@ impl<'a> Solver<'a> {
                     system.add_identity(i as u32, target * weight * weight);
                     system.pull(i as u32, &draw.along, target * weight);
                 }
+                Target::Openings(_) => {}
             }
             system.add_identity(i as u32, proximal);
             system.pull(i as u32, &(x[i] - self.begin[i]), proximal);
+        }
+        if let Target::Openings(wanted) = &self.target {
+            opening::draw(problem, wanted, x, target, system);
         }
         for &i in self.pinned {
             system.pin(i);
