@@ -124,6 +124,10 @@ fn what_no_rigid_triangles_can_do_is_refused_in_words() {
             "1",
         ),
         ("format = 1\ncolour = 3\n", "colour"),
+        (
+            "format = 1\nsigma = 1.1\n[[keyframe]]\n[[keyframe.handle]]\npoint = 1\nby_mm = [0, 0, 1]\n",
+            "open to 1.",
+        ),
     ] {
         let output = pose(folder.path(), handles);
         assert_eq!(output.status.code(), Some(2), "{handles}{}", said(&output));

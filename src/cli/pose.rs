@@ -13,8 +13,8 @@ use crate::base::units::short;
 use crate::job::EDGE_TOLERANCE;
 use crate::linkage::{read_obj, write_obj};
 use crate::mesh::{ClosestPoint, ImportOptions, import_file};
-use crate::rationalize::Soundness;
 use crate::rationalize::pose::Pose;
+use crate::rationalize::{SIGMA_TOLERANCE, Soundness};
 
 /// Weight with which a surface draws the points: the paper's final w₁.
 const CLOSENESS: f64 = 0.1;
@@ -68,6 +68,17 @@ pub fn run(args: &PoseArgs, global: &Global, terminal: &Terminal) -> Result<(), 
         .map_err(|_| Failure::Bad(format!("{handles} is not UTF-8 text")))?;
     let document = Document::new(handles, text);
     let pose = Pose::read(&document, &linkage, &start).map_err(Failure::bad)?;
+    let sigma = pose.sigma().unwrap_or(FULLY_OPEN);
+    let before = Soundness::measure(&linkage, &start, sigma);
+    if before.opening[2] > sigma + SIGMA_TOLERANCE {
+        return Err(Failure::Bad(format!(
+            "{}: sigma = {}, but a hinge of the linkage is open to {} already (point {}): give that at least, or close the linkage first (kagome states)",
+            args.handles.display(),
+            short(sigma, 3),
+            short(before.opening[2], 3),
+            before.opening_max.point,
+        )));
+    }
     let target = match &args.target {
         None => None,
         Some(path) => {
@@ -79,7 +90,6 @@ pub fn run(args: &PoseArgs, global: &Global, terminal: &Terminal) -> Result<(), 
     let (positions, effort) = pose
         .exact(&linkage, &start, target, terminal)
         .map_err(Failure::bad)?;
-    let sigma = pose.sigma().unwrap_or(FULLY_OPEN);
     let sound = Soundness::measure(&linkage, &positions, sigma);
     write_file(&args.output, write_obj(&linkage, &positions).as_bytes()).map_err(Failure::bad)?;
     terminal.clear();
