@@ -178,6 +178,25 @@ fn a_preview_with_held_closest_points_shows_the_shape() {
 }
 
 #[test]
+fn positions_that_are_not_one_for_each_point_are_refused() {
+    let case = case("cap", 100.0, 0, ConeRequest::Auto, 0.0, Handedness::Right);
+    let closest = ClosestPoint::new(&case.surface);
+    let short = &case.built.start[1..];
+    for solver in [Solver::Exact, Solver::Projection] {
+        let refused = rationalize(
+            &case.built.linkage,
+            short,
+            &closest,
+            case.sigma,
+            solver,
+            &Silent,
+        );
+        let words = refused.unwrap_err().to_string();
+        assert!(words.contains(&short.len().to_string()), "{words}");
+    }
+}
+
+#[test]
 fn removing_triangles_at_the_cone_leaves_four_then_sixteen_fewer() {
     let count = |remove| {
         let case = case(

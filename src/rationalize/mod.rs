@@ -59,6 +59,14 @@ pub enum RationalizeError {
     /// The linear system failed.
     #[error(transparent)]
     Factor(#[from] FactorError),
+    /// Positions or weights are not one for each point of the linkage.
+    #[error("{given} positions were given for a linkage of {points} points")]
+    Points {
+        /// How many were given.
+        given: usize,
+        /// How many there are.
+        points: usize,
+    },
     /// The person asked to stop.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
@@ -77,6 +85,7 @@ pub fn rationalize(
     solver: Solver,
     progress: &dyn Progress,
 ) -> Result<(Vec<Point3<f64>>, Effort), RationalizeError> {
+    check_count(linkage, start.len())?;
     let problem = Problem::new(linkage, sigma);
     match solver {
         Solver::Exact => {
@@ -102,10 +111,23 @@ pub fn settle(
     sigma: f64,
     progress: &dyn Progress,
 ) -> Result<(Vec<Point3<f64>>, Effort), RationalizeError> {
+    check_count(linkage, start.len())?;
+    check_count(linkage, places.len())?;
     let problem = Problem::new(linkage, sigma);
-    let pinned: Vec<u32> = pinned.iter().map(|p| p.0).collect();
+    let count = problem.points as u32;
+    let pinned: Vec<u32> = pinned.iter().map(|p| p.0).filter(|p| *p < count).collect();
     let target = exact::Target::Places(places);
     exact::solve(&problem, start, target, &pinned, linkage.edge_mm, progress)
+}
+
+/// Refuses positions that are not one for each point.
+fn check_count(linkage: &Linkage, given: usize) -> Result<(), RationalizeError> {
+    let points = linkage.point_count();
+    if given == points {
+        Ok(())
+    } else {
+        Err(RationalizeError::Points { given, points })
+    }
 }
 
 /// The scale factor λ of every hinge at `positions` (millimetres, by point), in the order of the linkage's hinges.

@@ -24,7 +24,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::projection::kernel::{Kernel, Outcome, Rest, Rules};
 use super::projection::{Follower, Separation};
-use super::{Problem, RationalizeError};
+use super::{Problem, RationalizeError, check_count};
 use crate::base::ids::Id as _;
 use crate::linkage::{Linkage, PointId, TriangleId};
 use crate::mesh::ClosestPoint;
@@ -163,6 +163,7 @@ impl Session {
     /// # Errors
     /// [`RationalizeError::Factor`]: memory.
     pub fn new(linkage: &Linkage, start: &[Point3<f64>]) -> Result<Self, RationalizeError> {
+        check_count(linkage, start.len())?;
         let problem = Problem::new(linkage, 2.0);
         let x: Vec<Vector3<f64>> = start.iter().map(|p| p.coords / linkage.edge_mm).collect();
         let rules = Rules {

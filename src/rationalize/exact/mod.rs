@@ -1,11 +1,12 @@
 //! The exact solve: Newton steps on all conditions at once, in units of L.
 //!
 //! Energy: half the squares of |e| − 1 for every edge, of every violated condition (3)–(6) and λ ≤ σ, of w times the
-//! distance from the target (a surface, point to plane, growing steeper where it is large; or a place of its own for
-//! each point), and of w/30 times the way from where the stage began. Three unknowns a point, less two edges, less one surface condition leave only freedom at
-//! the rim, so exact solutions on the surface are the rule: w fades out over a few stages without the edges having to
-//! give way. Where σ forbids the surface the edges stay exact and the distance shows it. Three things keep the number of
-//! factorisations at about a third of plain Gauss–Newton's:
+//! distance from the target (a surface, point to plane, growing steeper where it is large; a place of its own for each
+//! point; or a scale factor for each hinge), and of w/30 times the way from where the stage began. Three unknowns a
+//! point, less two edges, less one surface condition leave only freedom at the rim, so exact solutions on the surface
+//! are the rule: w fades out over a few stages without the edges having to give way. Where σ forbids the surface the
+//! edges stay exact and the distance shows it. Three things keep the number of factorisations at about a third of plain
+//! Gauss–Newton's:
 //!
 //! - violated conditions enter through a smooth max(0, r) whose rounding τ fades with w, so that a step sees the ones
 //!   that it is about to violate instead of finding out afterwards;
@@ -123,8 +124,9 @@ const WORTH: f64 = 0.05;
 const RESUME: usize = 2;
 /// In the last stage a factor serves again after a step that left less than this part of the energy.
 const CHORD: f64 = 1e-3;
-/// Edges are exact when none is off by more than this, in L; conditions when none is violated by more.
-const EXACT: f64 = 1e-13;
+/// Edges are exact when none is off by more than this, in L; conditions when none is violated by more. A few times what
+/// rounding leaves of positions a thousand L from the origin.
+const EXACT: f64 = 5e-13;
 /// A hinge gets its blocks when one of its bounds is nearer than this at the start, in L.
 const NEAR: f64 = 0.05;
 /// When some hinge without blocks comes to a bound, all nearer than this get theirs.

@@ -24,9 +24,9 @@ pub use separate::Separation;
 pub(super) use self::follow::Follower;
 pub use self::kernel::Rest;
 use self::kernel::{Kernel, Outcome, Rules};
-use super::RationalizeError;
 use super::exact::Effort;
 use super::problem::Problem;
+use super::{RationalizeError, check_count};
 use crate::base::progress::Progress;
 use crate::linkage::Linkage;
 use crate::mesh::ClosestPoint;
@@ -122,6 +122,7 @@ impl<'a> AlternatingProjection<'a> {
         closest: &'a ClosestPoint,
         options: &ProjectionOptions,
     ) -> Result<Self, RationalizeError> {
+        check_count(linkage, start.len())?;
         Self::of(
             &Problem::new(linkage, 2.0),
             linkage.edge_mm,
