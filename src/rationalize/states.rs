@@ -47,10 +47,13 @@ const LOOSE: f64 = 0.25;
 const SHORTEST: f64 = 0.002;
 
 /// Corrections of what the hinges are drawn to, for one step.
-const CORRECTIONS: usize = 5;
+const CORRECTIONS: usize = 8;
 
-/// From this mean opening a sheet without seams is laid down closed.
+/// The mean opening to which a sheet without seams is brought before it is laid down closed.
 const NEARLY_CLOSED: f64 = 1.01;
+
+/// … and below which that is done.
+const LAID_DOWN: f64 = 1.015;
 
 /// Solves for one step between two given states at the most.
 const MOST_STRIDES: f64 = 40.0;
@@ -403,13 +406,14 @@ impl<'a> Walk<'a> {
         let flat = if asked <= 1.0 { self.flat() } else { None };
         let goal = if flat.is_some() { NEARLY_CLOSED } else { asked };
         let mut stride = LONGEST;
-        while (goal - self.mean).abs() > MET && !(flat.is_some() && self.mean < goal) {
+        let lies = |mean: f64| flat.is_some() && mean < LAID_DOWN;
+        while (goal - self.mean).abs() > MET && !lies(self.mean) {
             let way = goal - self.mean;
             let on_the_way = way.abs() > stride || flat.is_some();
             let next = self.mean + stride.min(way.abs()).copysign(way);
             let next = if way.abs() > stride { next } else { goal };
             match self.step(next, on_the_way, progress)? {
-                Step::Arrived if next == goal => break,
+                Step::Arrived if next == goal && flat.is_none() => break,
                 Step::Arrived => stride = LONGEST.min(1.5 * stride),
                 Step::Bounded(gained) if gained < SHORTEST => break,
                 Step::Bounded(_) => {}
@@ -422,7 +426,7 @@ impl<'a> Walk<'a> {
             }
         }
         if let Some(flat) = flat
-            && self.mean < 1.5 * (NEARLY_CLOSED - 1.0) + 1.0
+            && self.mean < LAID_DOWN
         {
             self.x = aligned(&flat, &self.x);
             self.mean = mean(&hinge_scales(self.linkage, &self.x));
@@ -443,7 +447,6 @@ impl<'a> Walk<'a> {
         let enough = if on_the_way { LOOSE * way } else { MET };
         let mut drawn = (asked + self.lead).clamp(1.0, sigma);
         let mut x = self.x.clone();
-        let mut before: Option<(f64, f64)> = None;
         let mut best: Option<Found> = None;
         let mut bounded = false;
         for _ in 0..CORRECTIONS {
@@ -456,12 +459,6 @@ impl<'a> Walk<'a> {
             }
             let mean = q.opening[1];
             let off = mean - asked;
-            let slope = match before {
-                Some((there, was)) if (drawn - there).abs() > 1e-12 => {
-                    ((mean - was) / (drawn - there)).clamp(0.2, 2.0)
-                }
-                _ => 1.0,
-            };
             if best.as_ref().is_none_or(|b| off.abs() < b.off) {
                 best = Some(Found {
                     off: off.abs(),
@@ -470,12 +467,12 @@ impl<'a> Walk<'a> {
                     drawn,
                 });
             }
-            let next = (drawn - off / slope).clamp(1.0, sigma);
+            // No secant: a solve also goes on where the one before left off, and two differences tell little.
+            let next = (drawn - off).clamp(1.0, sigma);
             bounded = next == drawn;
             if off.abs() <= enough || bounded {
                 break;
             }
-            before = Some((drawn, mean));
             drawn = next;
             x = found;
         }
