@@ -73,7 +73,7 @@ pub struct MakeArgs {
     /// Rows of triangles that are cut twice along the seams, to be glued on the other side
     #[arg(long, value_enum, default_value_t = FlapsArg::Auto)]
     flaps: FlapsArg,
-    /// exact, or projection (the paper's method: a preview that rarely passes)
+    /// exact, or projection (the paper's method, accelerated: edges give way where the surface is out of reach)
     #[arg(long, value_enum, default_value_t = SolverArg::Exact)]
     solver: SolverArg,
     /// Distance from the surface that is accepted, in triangle edges [default: 0.1]

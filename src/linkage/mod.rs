@@ -138,7 +138,7 @@ pub enum LinkageError {
 }
 
 /// Largest number of triangles accepted. The solver's memory grows to a few gigabytes there.
-const MOST_TRIANGLES: usize = 200_000;
+const MOST_TRIANGLES: usize = 2_000_000;
 
 /// Builds the linkage of a layout.
 ///

@@ -4,7 +4,11 @@
 //! of its own: nothing is allocated. Among equally close faces the lowest id wins, and pruning leaves room for
 //! rounding, so that the answer depends neither on the order of the walk nor on a hint.
 
+mod tracker;
+
 use nalgebra::{Point3, Vector3};
+
+pub use tracker::ClosestTracker;
 
 use super::surface::{FaceId, Surface};
 use crate::base::ids::{Id as _, Per};
@@ -69,6 +73,26 @@ struct Triangle {
     face: FaceId,
 }
 
+/// A triangle with what of it is closest.
+#[derive(Clone, Copy)]
+struct Candidate {
+    hit: Hit,
+    face: FaceId,
+    slot: u32,
+}
+
+impl Candidate {
+    /// The closer one; of equally close ones that with the lower id.
+    #[inline]
+    fn or(self, other: Self) -> Self {
+        if (other.hit.squared, other.face) < (self.hit.squared, self.face) {
+            other
+        } else {
+            self
+        }
+    }
+}
+
 /// Answers closest-point queries on one surface. Building is O(n log n).
 pub struct ClosestPoint {
     nodes: Vec<Node>,
@@ -102,14 +126,15 @@ impl ClosestPoint {
 
     /// The point of the surface closest to `p` (mm).
     pub fn query(&self, p: Point3<f64>) -> Closest {
-        self.search(p, FaceId(0))
+        self.finish(self.search(&p, self.slots[FaceId(0)]))
     }
 
     /// As [`ClosestPoint::query`], and with the same answer, but faster if `hint` is a face close to it, such as the
     /// one found for the same point before it moved. A face that does not exist is ignored.
     pub fn query_from(&self, p: Point3<f64>, hint: FaceId) -> Closest {
         let known = hint.index() < self.slots.len();
-        self.search(p, if known { hint } else { FaceId(0) })
+        let first = self.slots[if known { hint } else { FaceId(0) }];
+        self.finish(self.search(&p, first))
     }
 
     /// Outward unit normal of a face; zero if the face has no area.
@@ -121,44 +146,46 @@ impl ClosestPoint {
             .unwrap_or_else(Vector3::zeros)
     }
 
-    fn search(&self, p: Point3<f64>, first: FaceId) -> Closest {
-        let start = self.slots[first] as usize;
-        let mut best = (
-            on_triangle(&self.triangles[start].corners, &p),
-            first,
-            start,
-        );
+    /// The best of triangle `slot`, as seen from `p`.
+    #[inline]
+    fn candidate(&self, p: &Point3<f64>, slot: u32) -> Candidate {
+        let triangle = &self.triangles[slot as usize];
+        Candidate {
+            hit: on_triangle(&triangle.corners, p),
+            face: triangle.face,
+            slot,
+        }
+    }
+
+    /// Starts from the triangle at `first`.
+    fn search(&self, p: &Point3<f64>, first: u32) -> Candidate {
+        let mut best = self.candidate(p, first);
         let mut stack = [(0u32, 0.0f64); DEPTH];
         let mut depth = 1;
         while depth > 0 {
             depth -= 1;
             let (node, bound) = stack[depth];
-            if bound > best.0.squared * (1.0 + SLACK) {
+            if bound > best.hit.squared * (1.0 + SLACK) {
                 continue;
             }
             let mut here = node as usize;
             loop {
                 let node = &self.nodes[here];
                 if node.count > 0 {
-                    let first = node.at as usize;
-                    let leaf = &self.triangles[first..first + node.count as usize];
-                    for (i, triangle) in leaf.iter().enumerate() {
-                        let hit = on_triangle(&triangle.corners, &p);
-                        if (hit.squared, triangle.face) < (best.0.squared, best.1) {
-                            best = (hit, triangle.face, first + i);
-                        }
+                    for slot in node.at..node.at + node.count {
+                        best = best.or(self.candidate(p, slot));
                     }
                     break;
                 }
                 let (left, right) = (here + 1, node.at as usize);
-                let to_left = self.nodes[left].distance_squared(&p);
-                let to_right = self.nodes[right].distance_squared(&p);
+                let to_left = self.nodes[left].distance_squared(p);
+                let to_right = self.nodes[right].distance_squared(p);
                 let (near, far) = if to_left <= to_right {
                     ((left, to_left), (right, to_right))
                 } else {
                     ((right, to_right), (left, to_left))
                 };
-                let limit = best.0.squared * (1.0 + SLACK);
+                let limit = best.hit.squared * (1.0 + SLACK);
                 if far.1 <= limit && depth < DEPTH {
                     stack[depth] = (far.0 as u32, far.1);
                     depth += 1;
@@ -169,8 +196,11 @@ impl ClosestPoint {
                 here = near.0;
             }
         }
-        let (hit, face, slot) = best;
-        let corners = &self.triangles[slot].corners;
+        best
+    }
+
+    fn finish(&self, Candidate { hit, face, slot }: Candidate) -> Closest {
+        let corners = &self.triangles[slot as usize].corners;
         Closest {
             point: match hit.feature {
                 Feature::Corner(k) => corners[k as usize],

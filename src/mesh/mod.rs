@@ -26,7 +26,7 @@ mod surface;
 pub mod units;
 pub mod write;
 
-pub use closest::{Closest, ClosestPoint, Feature, distance_to_triangle};
+pub use closest::{Closest, ClosestPoint, ClosestTracker, Feature, distance_to_triangle};
 pub use edit::{EditError, insert_point, slit};
 pub use error::{ImportError, Problem};
 pub use repair::{Import, ImportOptions, ImportReport, PartChoice, import_bytes, import_file};

@@ -1,27 +1,35 @@
 //! Stage 4: the lifted linkage becomes exact: rigid triangles, no overlap, hinges within σ, on the surface.
 //!
 //! [`rationalize`] runs one of two solvers from the opened lift: [`Solver::Exact`] (all conditions to rounding) or
-//! [`Solver::Projection`] (the paper's, for preview and comparison). [`Quality`] measures the result independently of
-//! either, [`Soundness`] the part of it that needs no surface. [`freedom()`] counts and finds the degrees of freedom that
-//! a linkage has left, [`softest`] the motions that cost least.
+//! [`Solver::Projection`] (the paper's, for preview and comparison; [`AlternatingProjection`] step by step).
+//! [`Quality`] measures the result independently of either, [`Soundness`] the part of it that needs no surface,
+//! [`Bounds`] what holds a linkage back at a place. [`freedom()`] counts and finds the degrees of freedom that a linkage
+//! has left, [`softest`] the motions that cost least. A [`Session`] poses a linkage by handles, frame by frame;
+//! [`pose`] reads poses from a file, [`settle`] makes them exact.
 
+mod bounds;
 mod exact;
 mod freedom;
 mod grid;
 mod motion;
 mod overlap;
+pub mod pose;
 mod problem;
 mod projection;
 mod quality;
+pub mod session;
 
 use nalgebra::{Point3, Vector3};
 
+pub use bounds::Bounds;
 pub use exact::{Effort, STAGE_COUNT};
 pub use freedom::{Freedom, FreedomError, Mobility, freedom};
 pub use motion::{MOST_MOTIONS, Motion, motions_obj, softest};
 pub use overlap::OVERLAP_TOLERANCE;
 pub use problem::Problem;
+pub use projection::{AlternatingProjection, Closeness, ProjectionOptions, Rest, Separation};
 pub use quality::{Quality, SIGMA_TOLERANCE, Soundness, Worst, failing};
+pub use session::{Edit, EditError, Hold, Session, Step};
 
 use crate::base::progress::{Interrupted, Progress};
 use crate::base::sparse::FactorError;

@@ -28,7 +28,7 @@ use super::RationalizeError;
 use super::problem::{CONDITIONS, Problem, hinge_violations};
 use crate::base::progress::Progress;
 use crate::base::sparse::FactorError;
-use crate::mesh::{ClosestPoint, FaceId};
+use crate::mesh::{ClosestPoint, ClosestTracker};
 
 /// What a solver did.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -102,8 +102,14 @@ const LAST_STEPS: usize = 16;
 const GAIN: f64 = 0.02;
 /// Rounds of parting triangles that cross.
 const PARTINGS: usize = 6;
+/// Tried only where there is not more than one crossing for so many triangles: if there are, they are no accident.
+const FEW: usize = 50;
+/// How much farther from the target the worst point may come by it, in L.
+const WORTH: f64 = 0.05;
 /// The stage that the solve goes back to in each of them.
 const RESUME: usize = 2;
+/// In the last stage a factor serves again after a step that left less than this part of the energy.
+const CHORD: f64 = 1e-3;
 /// Edges are exact when none is off by more than this, in L; conditions when none is violated by more.
 const EXACT: f64 = 1e-13;
 /// A hinge gets its blocks when one of its bounds is nearer than this at the start, in L.
@@ -160,7 +166,8 @@ struct Solver<'a> {
     trial: Vec<Vector3<f64>>,
     /// Where the stage began.
     begin: Vec<Vector3<f64>>,
-    faces: Vec<FaceId>,
+    /// Closest points, where the target is a surface.
+    tracker: Option<ClosestTracker<&'a ClosestPoint>>,
     /// What draws `x`, and `trial`.
     draws: Vec<Draw>,
     trial_draws: Vec<Draw>,
@@ -186,9 +193,9 @@ impl<'a> Solver<'a> {
             .map(|h| slack(problem, &h.map(|i| x[i as usize])) < NEAR)
             .collect();
         let system = System::new(problem, &near, &[])?;
-        let faces = match target {
-            Target::Surface(closest) => start.iter().map(|p| closest.query(*p).face).collect(),
-            Target::Places(_) => Vec::new(),
+        let tracker = match target {
+            Target::Surface(closest) => Some(ClosestTracker::new(closest, x.len())),
+            Target::Places(_) => None,
         };
         let none = Draw {
             along: Vector3::zeros(),
@@ -201,7 +208,7 @@ impl<'a> Solver<'a> {
             edge_mm,
             trial: x.clone(),
             begin: x.clone(),
-            faces,
+            tracker,
             draws: vec![none; x.len()],
             trial_draws: vec![none; x.len()],
             near,
@@ -221,18 +228,25 @@ impl<'a> Solver<'a> {
         self.x.iter().map(mm).collect()
     }
 
-    /// Parts triangles that cross though no hinge joins them; where that cannot be done, the fewest crossings that were
-    /// found stay.
+    /// Parts triangles that cross though no hinge joins them. Where that fails, or would cost more than it is worth,
+    /// everything stays as it is.
     fn part(&mut self, progress: &dyn Progress) -> Result<(), RationalizeError> {
-        let mut least = None;
+        let before = self.x.clone();
+        let allowed = self.farthest() + WORTH;
+        let mut most = self.problem.triangles.len() / FEW;
         for _ in 0..PARTINGS {
             let found = contacts(self.problem, &self.x);
-            if least.as_ref().is_none_or(|(n, _)| found.len() < *n) {
-                least = Some((found.len(), self.x.clone()));
+            let pairs = found.len() / 3;
+            if pairs == 0 {
+                if self.violation() > EXACT.sqrt() || self.farthest() > allowed {
+                    break;
+                }
+                return Ok(());
             }
-            if found.is_empty() {
+            if pairs > most {
                 break;
             }
+            most = pairs;
             self.contacts.extend(found);
             self.system = System::new(self.problem, &self.near, &self.contacts)?;
             self.effort.analyses += 1;
@@ -241,12 +255,14 @@ impl<'a> Solver<'a> {
             }
             self.run(&LAST, LAST_STEPS, progress)?;
         }
-        if let Some((n, x)) = least
-            && n < contacts(self.problem, &self.x).len()
-        {
-            self.x = x;
-        }
+        self.x = before;
         Ok(())
+    }
+
+    /// The longest way from a point to its target, in L.
+    fn farthest(&self) -> f64 {
+        let distances = self.draws.iter().map(|d| d.distance.abs());
+        distances.fold(0.0, f64::max)
     }
 
     /// What draws the points of `trial`, into `trial_draws`.
@@ -254,10 +270,12 @@ impl<'a> Solver<'a> {
         let edge_mm = self.edge_mm;
         match self.target {
             Target::Surface(closest) => {
-                let points = self.trial.iter().zip(&mut self.faces);
-                for ((x, face), draw) in points.zip(&mut self.trial_draws) {
-                    let found = closest.query_from(Point3::from(x * edge_mm), *face);
-                    *face = found.face;
+                let Some(tracker) = &mut self.tracker else {
+                    return;
+                };
+                let draws = self.trial_draws.iter_mut().enumerate();
+                for (x, (point, draw)) in self.trial.iter().zip(draws) {
+                    let found = tracker.query(point, Point3::from(x * edge_mm));
                     let offset = x - found.point.coords / edge_mm;
                     let distance = offset.norm();
                     // On the surface the direction to it is lost in rounding; its normal is the limit.
@@ -439,15 +457,20 @@ impl<'a> Solver<'a> {
         self.trial_draws.copy_from_slice(&self.draws);
         let mut energy = self.energy(stage);
         let mut damping = (DAMPING * stage.weight * stage.weight).max(LAST_DAMPING);
+        let mut factored = false;
         for _ in 0..steps {
             if last && self.violation() < EXACT {
                 break;
             }
+            let analyses = self.effort.analyses;
             self.assemble(stage)?;
-            let Some(there) = self.descend(stage, energy, &mut damping, progress)? else {
+            factored &= analyses == self.effort.analyses;
+            let Some(there) = self.descend(stage, energy, factored, &mut damping, progress)? else {
                 break;
             };
             self.effort.steps += 1;
+            // Near the end the last factor is as good as a new one.
+            factored = last && there < CHORD * energy;
             let gained = energy - there;
             energy = there;
             if !last && gained < GAIN * (gained + there) {
@@ -457,11 +480,13 @@ impl<'a> Solver<'a> {
         Ok(())
     }
 
-    /// One step from `x` that lowers the energy, and the energy there; none if there is little left to gain.
+    /// One step from `x` that lowers the energy, and the energy there; none if there is little left to gain. `factored`
+    /// if the factor of the step before is to be tried first.
     fn descend(
         &mut self,
         stage: &Stage,
         energy: f64,
+        mut factored: bool,
         damping: &mut f64,
         progress: &dyn Progress,
     ) -> Result<Option<f64>, RationalizeError> {
@@ -469,15 +494,17 @@ impl<'a> Solver<'a> {
         let mut growth = 6.0;
         while *damping < 1e6 {
             progress.check()?;
-            self.effort.factorizations += 1;
-            match self.system.factor(*damping) {
-                Ok(()) => {}
-                Err(FactorError::NotPositiveDefinite) => {
-                    *damping = (*damping * growth).max(1e-12);
-                    growth *= 4.0;
-                    continue;
+            if !factored {
+                self.effort.factorizations += 1;
+                match self.system.factor(*damping) {
+                    Ok(()) => {}
+                    Err(FactorError::NotPositiveDefinite) => {
+                        *damping = (*damping * growth).max(1e-12);
+                        growth *= 4.0;
+                        continue;
+                    }
+                    Err(other) => return Err(other.into()),
                 }
-                Err(other) => return Err(other.into()),
             }
             let promised = self.system.solve(&mut self.step);
             let moved = self.trial.iter_mut().zip(&self.x);
@@ -492,8 +519,14 @@ impl<'a> Solver<'a> {
             if there < energy {
                 std::mem::swap(&mut self.x, &mut self.trial);
                 std::mem::swap(&mut self.draws, &mut self.trial_draws);
-                *damping /= 5.0;
+                if !factored {
+                    *damping /= 5.0;
+                }
                 return Ok(Some(there));
+            }
+            if factored {
+                factored = false;
+                continue;
             }
             let longest = self.step.iter().fold(0.0f64, |m, s| m.max(s.abs()));
             let little = if stage.rounding > 0.0 {
