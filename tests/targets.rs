@@ -179,6 +179,30 @@ fn the_same_surface_again_changes_nothing() {
     assert!((first.opening - second.opening).abs() < 1e-3);
 }
 
+/// Halfway between a plate and the tube that it is bent to lies no useful surface: the pattern is laid on one of the two.
+#[test]
+fn a_plate_is_bent_to_a_tube() {
+    let bench = Bench::new();
+    bench.run(&["samples", "write", "cap:faces=4000", "-o", "plate.obj"]);
+    bench.reshape("plate.obj", "plate.obj", |[x, y, z]| [x, y, 0.05 * z]);
+    bench.reshape("plate.obj", "tube.obj", |[x, y, z]| {
+        let (sin, cos) = (x / 34.0).sin_cos();
+        [(34.0 + z) * sin, y, (34.0 + z) * cos]
+    });
+    let args = ["make", "plate.obj", "--also", "tube.obj", "-q", "-o", "out"];
+    bench.run(&[&args[..], &["--triangles", "400", "--sigma", "2"]].concat());
+    bench.judge("out");
+    let design = bench.read("out/design.toml");
+    let alone = |shares: &&str| design.contains(*shares);
+    assert!(
+        ["shares = [1.0, 0.0]", "shares = [0.0, 1.0]"]
+            .iter()
+            .any(alone),
+        "{design}"
+    );
+    assert!(!design.contains("[[dart]]"), "{design}");
+}
+
 /// What is decided about cones and darts by points of the first surface holds for all.
 #[test]
 fn cones_and_darts_stand_at_the_same_places_of_all() {

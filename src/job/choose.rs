@@ -29,64 +29,9 @@ const RETRIED: usize = 2;
 /// surface by about a third of that.
 const PROMISING: f64 = 0.7;
 
-/// Finds the shape that fits all targets: on the surface that the request names to lay the pattern on, else on the first
-/// of [`Targets::patterns`] on which one passes, else on that which comes closest to its worst target.
-pub(crate) fn choose(
-    request: &Request,
-    loaded: &Loaded,
-    stock: &Stock<'_>,
-    targets: &Targets,
-    progress: &dyn Progress,
-) -> Result<Shape, MakeError> {
-    let patterns = match &request.shares {
-        Some(shares) => vec![shares.clone()],
-        None => targets.patterns(),
-    };
-    let mut best: Option<Shape> = None;
-    let mut refused = None;
-    for shares in patterns {
-        if targets.several() {
-            progress.note(&laid_on(&shares, targets));
-        }
-        let surface = targets.mixed(&shares)?;
-        let shape = match choose_on(request, loaded, &surface, stock, targets, progress) {
-            Ok(shape) => Shape { shares, ..shape },
-            // Where a mean cannot be used, one of the surfaces may.
-            Err(error) if targets.several() && progress.check().is_ok() => {
-                refused.get_or_insert(error);
-                continue;
-            }
-            Err(error) => return Err(error),
-        };
-        if shape.verdict.pass {
-            return Ok(shape);
-        }
-        let nearer = |old: &Shape| shape.worst_distance() < old.worst_distance();
-        if best.as_ref().is_none_or(nearer) {
-            best = Some(shape);
-        }
-    }
-    let nothing = || MakeError::Internal("no pattern was tried".into());
-    best.ok_or_else(|| refused.unwrap_or_else(nothing))
-}
-
-/// Which surface the pattern is laid on, in words.
-pub(crate) fn laid_on(shares: &[f64], targets: &Targets) -> String {
-    match shares.iter().position(|&s| s == 1.0) {
-        Some(alone) => format!("the pattern is laid on {}", targets.0[alone].name),
-        None => {
-            let shares: Vec<String> = shares.iter().map(|s| short(100.0 * s, 1)).collect();
-            format!(
-                "the pattern is laid on the mean of the surfaces ({} %)",
-                shares.join(" + ")
-            )
-        }
-    }
-}
-
 /// Finds the shape with the pattern on one surface, `original`: the first map that passes, with as few darts as possible,
 /// else the one that comes closest.
-fn choose_on(
+pub(crate) fn choose(
     request: &Request,
     loaded: &Loaded,
     original: &Surface,
@@ -278,7 +223,12 @@ impl Tries {
             return Ok(Some(shape));
         }
         progress.note(&format!(
-            "tried: the sheet misses the surface by {} L",
+            "tried: the sheet misses {} by {} L",
+            if targets.several() {
+                "one of the surfaces"
+            } else {
+                "the surface"
+            },
             short(shape.worst_distance(), 2)
         ));
         let nearer = |old: &Shape| shape.worst_distance() < old.worst_distance();

@@ -10,7 +10,6 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Point2, Point3};
 use serde_json::Value;
 
-use super::choose::choose;
 use super::cut::{CutResult, cut};
 use super::design::{
     AlsoChoice, ConeChoice, DartChoice, Design, FORMAT, LinkageChoice, SheetChoice, SolveChoice,
@@ -20,6 +19,7 @@ use super::load::{Also, Loaded, MOST_SURFACES, load};
 use super::maps::cone_opening_mm;
 use super::report::{self, Page, Pose, Stroke};
 use super::request::{Request, Source};
+use super::several::choose_for_all;
 use super::shape::{Fit, Stock, on_shape};
 use super::verdict::{Reason, Verdict};
 use super::{MakeError, remedy, tell};
@@ -109,7 +109,7 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     let surface = &loaded.import.surface;
     let targets = loaded.targets(&request.source);
     targets.check_sizes(stock.sigma)?;
-    let mut shape = choose(request, &loaded, &stock, &targets, progress)?;
+    let mut shape = choose_for_all(request, &loaded, &stock, &targets, progress)?;
     if !shape.verdict.pass && request.solver == Solver::Exact {
         remedy::explain(request, &mut shape, &stock, &targets, progress)?;
     }

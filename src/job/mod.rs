@@ -2,7 +2,7 @@
 //!
 //! A [`Request`] is what a person asks for; [`make()`] takes it through every stage, and a [`Design`] is what was
 //! decided, so that the same sheet can be made again. A [`Verdict`] says whether it may be cut; only then is there a
-//! pattern or a job.
+//! pattern or a job. One sheet may be made for several surfaces, see [`Request::also`]: the verdict holds for all.
 
 mod choose;
 mod cut;
@@ -17,6 +17,7 @@ pub mod picture;
 mod remedy;
 pub mod report;
 mod request;
+mod several;
 mod shape;
 mod states;
 mod targets;

@@ -1,8 +1,7 @@
 //! The surfaces that one pattern is to fit, and the one that it is laid on.
 //!
 //! Several targets are one mesh in several shapes (paper, Fig. 4): the same faces, other positions. So every place of one
-//! is a place of all, and a pattern that is laid on one, or on a mean of them, has a start on each. Which surface it is
-//! laid on is decided by trying: see [`Targets::patterns`].
+//! is a place of all, and a pattern that is laid on one, or on a mean of them, has a start on each.
 
 use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 
@@ -66,8 +65,8 @@ impl Targets {
         Ok(())
     }
 
-    /// The shares of the targets in the surfaces that a pattern may be laid on, the most promising first: their mean,
-    /// then each of them; the first alone where all are of one shape.
+    /// The shares of the targets in the surfaces that a pattern may be laid on: their mean, then each of them; the first
+    /// alone where all are of one shape.
     pub fn patterns(&self) -> Vec<Vec<f64>> {
         let count = self.0.len();
         let alone = |k: usize| (0..count).map(|i| f64::from(u8::from(i == k))).collect();
