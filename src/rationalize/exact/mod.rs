@@ -110,8 +110,8 @@ const PROXIMAL: f64 = 1.0 / 30.0;
 const DAMPING: f64 = 1e-2;
 /// Steps in one stage at the most. Feasible cases take one or two; infeasible ones would creep on without end.
 const STEPS: usize = 15;
-/// Steps in the last stage at the most.
-const LAST_STEPS: usize = 16;
+/// Steps in the last stage at the most: from a surface it takes three or four, from a pose that stretches the linkage far more.
+const LAST_STEPS: usize = 60;
 /// A stage ends when a step gains, or promises, less than this part of the energy.
 const GAIN: f64 = 0.02;
 /// Rounds of parting triangles that cross.
