@@ -67,6 +67,9 @@ pub(crate) fn explain(
     if let Some(found) = found {
         text += &found;
     }
+    if targets.several() {
+        text = format!("on {}: {text}", targets.0[n].name);
+    }
     let reasons = &mut shape.verdict.reasons;
     let after = reasons
         .iter()
