@@ -439,7 +439,7 @@ mod tests {
             for (i, p) in points.iter().enumerate() {
                 let m = p.midpoint(points[(i + 1) % points.len()]);
                 let out = m.distance(Point::new(3.0, -1.0));
-                assert!(out <= 2.0 && out >= 1.99 - 1e-12);
+                assert!((1.99 - 1e-12..=2.0 + 1e-12).contains(&out));
             }
         }
     }
