@@ -19,6 +19,7 @@ pub mod report;
 mod request;
 mod several;
 mod shape;
+mod sheets;
 mod states;
 mod targets;
 mod tell;
@@ -35,7 +36,8 @@ pub use linkage_figures::LinkageFigures;
 pub use make::{FILES, Made, make};
 pub use map_figures::{ConeFigures, MapFigures};
 pub use request::{
-    ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, FlapWish, Request, Source,
+    ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, FlapWish, Request,
+    SheetWish, Source, TAB_WIDTH_MM,
 };
 pub use states::{Opening, StateFigures, StateFiles};
 pub use verdict::{COVERAGE_WANTED, EDGE_TOLERANCE, Reason, Verdict};
@@ -48,6 +50,16 @@ use crate::mesh::VertexId;
 /// Why nothing was made.
 #[derive(Debug, thiserror::Error)]
 pub enum MakeError {
+    /// The sheet would be divided into more sheets than anybody would cut.
+    #[error(
+        "the sheet fills {sheets} pieces of stock, and {most} is the most: make it smaller (--size, --scale), or use larger stock (--stock) or a larger machine"
+    )]
+    TooManySheets {
+        /// How many it would be.
+        sheets: usize,
+        /// The most.
+        most: usize,
+    },
     /// The mesh file cannot be read.
     #[error("cannot read {path}: {source}")]
     Read {

@@ -152,7 +152,7 @@ pub struct Sheet {
 }
 
 /// What a sheet amounts to.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Figures {
     /// Number of triangles, flap triangles not counted.
     pub triangles: usize,
@@ -429,6 +429,25 @@ impl Sheet {
             tabs: Vec::new(),
             metadata,
         })
+    }
+
+    /// Nothing to cut.
+    pub(super) fn empty() -> Self {
+        Self {
+            slits: Vec::new(),
+            contours: Vec::new(),
+            triangles: Vec::new(),
+            flaps: Vec::new(),
+            marks: Vec::new(),
+            tabs: Vec::new(),
+            metadata: SheetMetadata {
+                hinge_width_mm: 1.0,
+                kerf_mm: 0.1,
+                edge_mm: 10.0,
+                tip: Tip::Plain,
+                corner_radius_mm: 0.0,
+            },
+        }
     }
 
     /// The smallest rectangle around all contours.
