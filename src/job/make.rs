@@ -439,6 +439,17 @@ pub(crate) fn checked_sigma(sigma: f64) -> Result<f64, MakeError> {
 }
 
 fn check_ranges(accept_distance: f64, stock: &Stock<'_>) -> Result<(), MakeError> {
+    let area = stock.area();
+    let (width_mm, height_mm) = (area.free.width(), area.free.height());
+    // Two triangles and their hinge.
+    let least_mm = 2.0 * stock.options.hinge_width_mm + 4.0 * stock.options.kerf_mm;
+    if width_mm.min(height_mm) < least_mm {
+        return Err(MakeError::NoStock {
+            width_mm: width_mm.max(0.0),
+            height_mm: height_mm.max(0.0),
+            margin_mm: stock.machine.bed.margin_mm,
+        });
+    }
     for (what, value, least, most) in [
         ("--accept-distance", accept_distance, 0.0, 100.0),
         (

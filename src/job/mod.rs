@@ -50,6 +50,18 @@ use crate::mesh::VertexId;
 /// Why nothing was made.
 #[derive(Debug, thiserror::Error)]
 pub enum MakeError {
+    /// The stock has no room for anything.
+    #[error(
+        "the stock leaves {width_mm} x {height_mm} mm inside margins of {margin_mm} mm: nothing that has a hinge fits. Use larger stock (--stock), or a smaller margin_mm in the machine's profile"
+    )]
+    NoStock {
+        /// Room.
+        width_mm: f64,
+        /// Room.
+        height_mm: f64,
+        /// Margin on each side.
+        margin_mm: f64,
+    },
     /// The sheet would be divided into more sheets than anybody would cut.
     #[error(
         "the sheet fills {sheets} pieces of stock, and {most} is the most: make it smaller (--size, --scale), or use larger stock (--stock) or a larger machine"

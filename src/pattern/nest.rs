@@ -292,6 +292,10 @@ impl Mask {
 /// [`PatternError::TooLarge`] for a part that fits on an empty sheet in no direction that is tried.
 pub fn nest(parts: &[Sheet], stock: &StockArea, mirror: bool) -> Result<Vec<Nested>, PatternError> {
     let (width, height) = (stock.free.width(), stock.free.height());
+    if !(width > 0.0 && height > 0.0) {
+        let part = parts.first().map_or_else(Sheet::empty, Sheet::clone);
+        return Err(too_large(&part, width.max(0.0), height.max(0.0)));
+    }
     let cell_mm = width.max(height) / CELLS;
     let (columns, rows) = (
         (width / cell_mm).floor() as usize,

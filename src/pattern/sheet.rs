@@ -268,7 +268,7 @@ pub enum PatternError {
     },
     /// Larger than the bed.
     #[error(
-        "the sheet is {width_mm:.1} x {height_mm:.1} mm with its cut, and the bed has {bed_width_mm:.1} x {bed_height_mm:.1} mm inside its margins, either way round. It fits with triangles of edge {fitting_edge_mm:.3} mm or less in the same number (--scale {fitting_scale:.4} of this size), or on a larger machine"
+        "the sheet is {width_mm:.1} x {height_mm:.1} mm with its cut, and there is room for {bed_width_mm:.1} x {bed_height_mm:.1} mm inside the margins, whichever way it is turned. It fits with triangles of edge {fitting_edge_mm:.3} mm or less in the same number (--scale {fitting_scale:.4} of this size), or on a larger machine"
     )]
     TooLarge {
         /// Width with half a cut on each side.
@@ -298,7 +298,7 @@ fn narrower(largest_hinge_mm: f64) -> String {
     if largest_hinge_mm > 0.0 {
         format!(", or the hinge at most {largest_hinge_mm:.3} mm wide (--hinge)")
     } else {
-        ": the kerf alone is too wide for them".into()
+        ": the cut alone is too wide for them".into()
     }
 }
 
