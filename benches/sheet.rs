@@ -9,7 +9,7 @@ use kagome::gcode;
 use kagome::linkage::{Handedness, Linkage};
 use kagome::machine::{self, Machine};
 use kagome::material::{self, CutSetting, Material};
-use kagome::pattern::{self, Sheet};
+use kagome::pattern::{self, Sheet, SheetOptions};
 use kagome::toolpath::{self, Toolpath};
 
 fn main() {
@@ -38,7 +38,8 @@ fn case(radius: i32) -> Case {
     let linkage = Linkage::patch(7.0, Handedness::Right, &Linkage::hexagon_cells(radius));
     let sheet = sheet(&linkage, &setting);
     let (sheet, _) = pattern::placed(&sheet, &machine, false).expect("a large bed");
-    let toolpath = toolpath::plan(&sheet, &setting, [0.0, 0.0]).expect("wide slots");
+    let toolpath = toolpath::plan(&sheet, &toolpath::CutOptions::of(&setting), [0.0, 0.0])
+        .expect("wide slots");
     let text = gcode::write(&toolpath, &machine, &material).expect("short lines");
     Case {
         linkage,
@@ -52,7 +53,7 @@ fn case(radius: i32) -> Case {
 }
 
 fn sheet(linkage: &Linkage, setting: &CutSetting) -> Sheet {
-    Sheet::new(linkage, 1.0, setting.kerf_mm).expect("wide triangles")
+    Sheet::new(linkage, &SheetOptions::plain(1.0, setting.kerf_mm)).expect("wide triangles")
 }
 
 #[divan::bench(args = RADII)]
@@ -76,7 +77,7 @@ fn svg_read(bencher: divan::Bencher<'_, '_>, radius: i32) {
 #[divan::bench(args = RADII, sample_count = 5)]
 fn order(bencher: divan::Bencher<'_, '_>, radius: i32) {
     let c = case(radius);
-    bencher.bench(|| toolpath::plan(&c.sheet, &c.setting, [0.0, 0.0]));
+    bencher.bench(|| toolpath::plan(&c.sheet, &toolpath::CutOptions::of(&c.setting), [0.0, 0.0]));
 }
 
 #[divan::bench(args = RADII)]

@@ -30,10 +30,19 @@ fn the_flat_hexagon_is_drawn_and_cut_as_ever() {
     let material = material::load(material::DEFAULT).unwrap();
     let setting = material.cut_for(&machine).unwrap();
     let linkage = Linkage::patch(20.0, Handedness::Right, &Linkage::hexagon_cells(1));
-    let sheet = pattern::Sheet::new(&linkage, material.hinge_width_mm, setting.kerf_mm).unwrap();
+    let sheet = pattern::Sheet::new(
+        &linkage,
+        &pattern::SheetOptions::plain(material.hinge_width_mm, setting.kerf_mm),
+    )
+    .unwrap();
     let (sheet, _) = pattern::placed(&sheet, &machine, false).unwrap();
     let park = machine.job.park;
-    let path = toolpath::plan(&sheet, &setting, [park.x_mm, park.y_mm]).unwrap();
+    let path = toolpath::plan(
+        &sheet,
+        &toolpath::CutOptions::of(&setting),
+        [park.x_mm, park.y_mm],
+    )
+    .unwrap();
     compare("pattern.svg", &pattern::svg(&sheet));
     compare("job.nc", &gcode::write(&path, &machine, &material).unwrap());
 }

@@ -1,6 +1,7 @@
 //! What every room stands on, and nothing that belongs to one of them.
 //!
 //! - [`catalog`]: shipped profiles and profiles from files, by one name;
+//! - [`curve`]: lines of straight pieces and arcs;
 //! - [`ids`]: typed indices and the per-element containers that only they open;
 //! - [`progress`]: how long work reports and how it is interrupted, without knowing a terminal;
 //! - [`atomic`]: outputs that appear complete or not at all;
@@ -12,6 +13,7 @@
 
 pub mod atomic;
 pub mod catalog;
+pub mod curve;
 pub mod document;
 pub mod ids;
 pub mod progress;

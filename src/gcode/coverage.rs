@@ -120,8 +120,13 @@ impl Index {
         }
     }
 
+    /// An indexed segment by its number.
+    pub fn segment(&self, n: u32) -> Segment {
+        self.segments[n as usize]
+    }
+
     /// The segments whose neighbourhood may touch `segment`, each once, into `found`.
-    fn near(&self, segment: &Segment, tolerance: f64, found: &mut Vec<u32>) {
+    pub fn near(&self, segment: &Segment, tolerance: f64, found: &mut Vec<u32>) {
         found.clear();
         let pieces = (segment.length() / PIECE_MM).ceil().clamp(1.0, 10_000.0) as usize;
         for k in 0..pieces {

@@ -4,13 +4,16 @@
 //! that a controller would make, beam and all, and complains by line. [`verify`] compares those moves with the machine
 //! and, where a sheet is given, with what it wants cut: every cut as often as asked, nothing else, nothing outside.
 
+mod compare;
 mod coverage;
 mod interpret;
+mod ligament;
 #[cfg(test)]
 mod round_trip;
 mod verify;
 mod write;
 
 pub use interpret::{Beam, Move, Program, read};
+pub use ligament::Ligaments;
 pub use verify::{Finding, Rule, TOLERANCE_MM, Verdict, compare_burnt, verify};
-pub use write::{GcodeError, machine_of, passes_of, write};
+pub use write::{Declared, GcodeError, machine_of, passes_of, write};

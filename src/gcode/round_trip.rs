@@ -2,15 +2,16 @@
 
 use std::collections::BTreeSet;
 
+use kurbo::Vec2;
 use proptest::prelude::*;
 
-use super::{Finding, Rule, compare_burnt, passes_of, read, verify, write};
+use super::{Declared, Finding, Rule, compare_burnt, passes_of, read, verify, write};
 use crate::base::ids::Id;
 use crate::linkage::{Handedness, Linkage, TriangleId};
 use crate::machine::{self, Machine};
 use crate::material;
-use crate::pattern::{Sheet, placed, read_svg, svg};
-use crate::toolpath::plan;
+use crate::pattern::{Label, Mark, MarkKind, Sheet, SheetOptions, Tip, placed, read_svg, svg};
+use crate::toolpath::{CornerSlowdown, CutOptions, PassOrder, plan};
 
 /// The largest edge-connected part of a hexagon of cells without those of `removed`.
 fn patch(handedness: Handedness, removed: &BTreeSet<usize>) -> Linkage {
@@ -55,13 +56,75 @@ fn job(linkage: &Linkage, passes: u32, mirror: bool) -> (Sheet, String, Machine)
     let material = material::load(material::DEFAULT).unwrap();
     let mut setting = material.cut_for(&machine).unwrap();
     setting.passes = passes;
-    let sheet = Sheet::new(linkage, material.hinge_width_mm, setting.kerf_mm).unwrap();
+    let sheet = Sheet::new(
+        linkage,
+        &SheetOptions::plain(material.hinge_width_mm, setting.kerf_mm),
+    )
+    .unwrap();
     let (sheet, _) = placed(&sheet, &machine, mirror).unwrap();
     // What the verifier gets is the drawing, not our memory of it.
     let sheet = read_svg(&svg(&sheet)).unwrap();
-    let toolpath = plan(&sheet, &setting, [0.0, 0.0]).unwrap();
+    let toolpath = plan(&sheet, &CutOptions::of(&setting), [0.0, 0.0]).unwrap();
     let text = write(&toolpath, &machine, &material).unwrap();
     (sheet, text, machine)
+}
+
+/// The same with every shape that a sheet may have, cut in every way.
+fn shaped(
+    linkage: &Linkage,
+    tip: Tip,
+    rounded: bool,
+    cut: CutOptions,
+    tabs: bool,
+) -> (Sheet, String, Machine) {
+    let machine = machine::load(machine::DEFAULT).unwrap();
+    let material = material::load(material::DEFAULT).unwrap();
+    let options = SheetOptions {
+        tip,
+        corner_radius_mm: if rounded { 0.7 } else { 0.0 },
+        ..SheetOptions::plain(0.8, 0.2)
+    };
+    let mut sheet = Sheet::new(linkage, &options).unwrap();
+    let corners = sheet.triangles[0];
+    let middle = (corners.iter().fold(Vec2::ZERO, |s, p| s + p.to_vec2()) / 3.0).to_point();
+    sheet.marks.push(Mark {
+        kind: MarkKind::Name,
+        lines: vec![],
+        label: Some(Label {
+            text: "A1".into(),
+            at: middle,
+            up: Vec2::new(0.0, 1.0),
+            height_mm: 2.0,
+        }),
+    });
+    if tabs {
+        sheet.tabs = sheet.even_tabs(3, 0.6);
+    }
+    let (sheet, _) = placed(&sheet, &machine, false).unwrap();
+    let sheet = read_svg(&svg(&sheet)).unwrap();
+    let toolpath = plan(&sheet, &cut, [0.0, 0.0]).unwrap();
+    let text = write(&toolpath, &machine, &material).unwrap();
+    (sheet, text, machine)
+}
+
+fn wide_cut(pierce_mm: f64, passes: u32, pass_order: PassOrder) -> CutOptions {
+    let machine = machine::load(machine::DEFAULT).unwrap();
+    let material = material::load(material::DEFAULT).unwrap();
+    CutOptions {
+        passes,
+        pass_order,
+        pierce_mm,
+        lead_in_mm: 1.5,
+        lead_out_mm: 0.8,
+        overcut_mm: 0.9,
+        corner: Some(CornerSlowdown {
+            angle: 0.4,
+            distance_mm: 0.5,
+            percent: 60.0,
+        }),
+        engrave: Some((3000.0, 5.0)),
+        ..CutOptions::of(&material.cut_for(&machine).unwrap())
+    }
 }
 
 fn removed() -> impl Strategy<Value = BTreeSet<usize>> {
@@ -85,6 +148,35 @@ proptest! {
         prop_assert_eq!(&verdict.findings, &[]);
         prop_assert_eq!(verdict.passes, Some(passes));
         prop_assert!(findings(&text, &machine, &sheet, passes + 1).iter().any(|f| f.rule == Rule::Missing));
+    }
+
+    #[test]
+    fn every_shape_and_way_of_cutting_is_proved(
+        removed in removed(),
+        left: bool,
+        shape in 0usize..3,
+        rounded: bool,
+        tabs: bool,
+        pierce in prop_oneof![Just(0.1), Just(0.9)],
+        passes in 1u32..3,
+        by_sheet: bool,
+    ) {
+        let handedness = if left { Handedness::Left } else { Handedness::Right };
+        let tip = [Tip::Plain, Tip::Round { radius_mm: 0.5 }, Tip::Teardrop { radius_mm: 0.4 }][shape];
+        let order = if by_sheet { PassOrder::Sheet } else { PassOrder::Cut };
+        let linkage = patch(handedness, &removed);
+        let (sheet, text, machine) = shaped(&linkage, tip, rounded, wide_cut(pierce, passes, order), tabs);
+        let verdict = verify(&text, &machine, Some(&sheet), None).unwrap();
+        prop_assert_eq!(&verdict.findings, &[]);
+        let ligaments = verdict.ligaments.unwrap();
+        prop_assert_eq!(ligaments.pieces, Some(1));
+        if !sheet.slits.is_empty() {
+            prop_assert!((ligaments.narrowest_mm - 0.8).abs() < 0.003, "{}", ligaments.narrowest_mm);
+        }
+        // Without its header's word nothing is burnt beside the drawing.
+        let bare: String = text.lines().filter(|l| *l != "; leads").map(|l| format!("{l}\n")).collect();
+        let leads = text.contains("; leads\n");
+        prop_assert_eq!(findings(&bare, &machine, &sheet, passes).iter().any(|f| f.rule == Rule::Stray), leads);
     }
 
     #[test]
@@ -215,7 +307,7 @@ fn a_doubled_job_is_not_taken_for_one_of_two_passes() {
         .iter()
         .map(|f| f.rule)
         .collect();
-    assert_eq!(rules, BTreeSet::from([Rule::Repeated]));
+    assert_eq!(rules, BTreeSet::from([Rule::Repeated, Rule::Order]));
     let (_, text, _) = job(&patch(Handedness::Right, &BTreeSet::new()), 3, false);
     assert_eq!(passes_of(&text), Some(3));
 }
@@ -231,7 +323,10 @@ fn a_missing_corner_of_short_pieces_is_found_as_one_gap() {
         .map(|m| [m.from.unwrap(), m.to])
         .collect();
     const GAP_MM: f64 = 0.06;
-    assert_eq!(compare_burnt(&sheet, &all, 1, GAP_MM).unwrap(), []);
+    assert_eq!(
+        compare_burnt(&sheet, &all, 1, &Declared::default(), GAP_MM).unwrap(),
+        []
+    );
     let is_short = |p: &[kurbo::Point; 2]| p[0].distance(p[1]) < GAP_MM - 0.02;
     // The longest row of short chords: one rounded corner.
     let mut longest = 0..0;
@@ -253,7 +348,14 @@ fn a_missing_corner_of_short_pieces_is_found_as_one_gap() {
         "{longest:?}: {length} mm"
     );
     let without = |row: std::ops::Range<usize>| [&all[..row.start], &all[row.end..]].concat();
-    let found = compare_burnt(&sheet, &without(longest.clone()), 1, GAP_MM).unwrap();
+    let found = compare_burnt(
+        &sheet,
+        &without(longest.clone()),
+        1,
+        &Declared::default(),
+        GAP_MM,
+    )
+    .unwrap();
     assert_eq!(
         found.iter().map(|f| f.rule).collect::<Vec<_>>(),
         [Rule::Missing],
@@ -261,7 +363,10 @@ fn a_missing_corner_of_short_pieces_is_found_as_one_gap() {
     );
     // One piece alone is a gap that is allowed.
     let one = longest.start..longest.start + 1;
-    assert_eq!(compare_burnt(&sheet, &without(one), 1, GAP_MM).unwrap(), []);
+    assert_eq!(
+        compare_burnt(&sheet, &without(one), 1, &Declared::default(), GAP_MM).unwrap(),
+        []
+    );
 }
 
 #[test]

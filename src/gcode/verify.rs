@@ -4,22 +4,18 @@ use std::fmt;
 
 use kurbo::Point;
 
-use super::coverage::{Index, Pieces, Segment};
+use super::compare::{Kind, NO_GAP_MM, Wanted, compare};
+use super::coverage::{Index, Segment};
 use super::interpret::{Program, read};
-use super::write::passes_of;
+use super::ligament::{Ligaments, Outside, check_order, distance, measure};
+use super::write::{Declared, passes_of};
 use crate::base::units::short;
 use crate::machine::{Machine, PowerMode};
 use crate::pattern::Sheet;
-use crate::toolpath::{ToolpathError, outline};
+use crate::toolpath::ToolpathError;
 
 /// How far a burnt line may be from a wanted one and still be it, millimetres. Rounding to three decimals takes 0.0007.
 pub const TOLERANCE_MM: f64 = 0.01;
-
-/// Gaps below this are rounding, millimetres.
-const NO_GAP_MM: f64 = 1e-6;
-
-/// Where two strokes meet at an angle, a short piece lies within the tolerance of both: up to 2τ at 30° and more.
-const JOINT_MM: f64 = 2.0 * TOLERANCE_MM;
 
 /// Rounding of coordinates may go over the bed's edge by this much, millimetres.
 const EDGE_MM: f64 = 0.001;
@@ -54,6 +50,16 @@ pub enum Rule {
     Repeated,
     /// Nothing else is burnt.
     Stray,
+    /// No ligament is narrower than the hinge width.
+    Ligament,
+    /// Nothing falls out before the rim is cut.
+    Loose,
+    /// Rims come after everything inside them.
+    Order,
+    /// No pierce hole touches a ligament or what stays.
+    Pierce,
+    /// Marks are engraved with less than what cuts.
+    Engraving,
 }
 
 /// One thing that is wrong.
@@ -99,6 +105,8 @@ pub struct Verdict {
     pub passes: Option<u32>,
     /// Whether the burnt lines were compared with a sheet.
     pub compared: bool,
+    /// The ligaments as burnt; `None` without a sheet.
+    pub ligaments: Option<Ligaments>,
 }
 
 impl Verdict {
@@ -139,8 +147,10 @@ pub fn verify(
     };
     let burnt_mm = length(false);
     let mut found_passes = None;
+    let mut ligaments = None;
     if let Some(sheet) = sheet {
-        let wanted = Wanted::new(sheet)?;
+        let declared = Declared::of(text);
+        let wanted = Wanted::new(sheet, &declared)?;
         let n = passes.or_else(|| passes_of(text)).unwrap_or(1);
         found_passes = Some(n);
         let burnt: Vec<(Option<usize>, Segment)> = program
@@ -157,7 +167,22 @@ pub fn verify(
                 )
             })
             .collect();
-        compare(&burnt, &wanted, n, NO_GAP_MM, &mut findings);
+        let outside = Outside::new(sheet, &wanted);
+        let scrap = |piece: &Segment| declared.leads && outside.is_scrap(piece);
+        compare(&burnt, &wanted, n, NO_GAP_MM, &scrap, &mut findings);
+        check_order(sheet, &wanted, &burnt, &mut findings);
+        let cuts = if declared.marks {
+            let engraved = engraved(&program, &wanted, &mut findings);
+            burnt
+                .into_iter()
+                .zip(engraved)
+                .filter(|(_, mark)| !mark)
+                .map(|(b, _)| b)
+                .collect()
+        } else {
+            burnt
+        };
+        ligaments = Some(measure(sheet, &cuts, &mut findings));
     }
     findings.sort_by_key(|f| f.line.unwrap_or(usize::MAX));
     Ok(Verdict {
@@ -166,6 +191,7 @@ pub fn verify(
         travel_mm: length(true),
         passes: found_passes,
         compared: sheet.is_some(),
+        ligaments,
     })
 }
 
@@ -282,125 +308,47 @@ fn check_moves(program: &Program, machine: &Machine, findings: &mut Vec<Finding>
     }
 }
 
-/// What a sheet wants burnt.
-struct Wanted {
-    segments: Vec<Segment>,
-    /// For each cut its name and its segments.
-    cuts: Vec<(&'static str, std::ops::Range<usize>)>,
-}
-
-impl Wanted {
-    fn new(sheet: &Sheet) -> Result<Self, ToolpathError> {
-        let mut wanted = Self {
-            segments: Vec::with_capacity(sheet.slits.len()),
-            cuts: Vec::with_capacity(sheet.slits.len()),
+/// For each burning move whether it engraves a mark. A mark that gets as much energy a millimetre as the gentlest cut is a
+/// finding: it would go through.
+fn engraved(program: &Program, wanted: &Wanted, findings: &mut Vec<Finding>) -> Vec<bool> {
+    let index = Index::new(wanted.segments.clone());
+    let owners = wanted.owners();
+    let mut near = Vec::new();
+    let mut of_mark = |m: &super::Move| {
+        let from = m.from.unwrap_or(m.to);
+        let middle = from.midpoint(m.to);
+        let spot = Segment {
+            a: middle,
+            b: middle,
         };
-        for slit in &sheet.slits {
-            let at = wanted.segments.len();
-            wanted.segments.push(Segment {
-                a: slit.tail,
-                b: slit.tip,
-            });
-            wanted.cuts.push(("the slit", at..at + 1));
-        }
-        for contour in &sheet.contours {
-            let at = wanted.segments.len();
-            let line = outline(contour, sheet.metadata.kerf_mm)?;
-            for i in 0..line.len() {
-                wanted.segments.push(Segment {
-                    a: line[i],
-                    b: line[(i + 1) % line.len()],
-                });
-            }
-            let name = if contour.outer { "the rim" } else { "the hole" };
-            wanted.cuts.push((name, at..wanted.segments.len()));
-        }
-        Ok(wanted)
+        index.near(&spot, TOLERANCE_MM, &mut near);
+        let mut kinds = near
+            .iter()
+            .filter(|n| distance(&spot, &index.segment(**n)) <= TOLERANCE_MM)
+            .map(|n| wanted.cuts[owners[*n as usize] as usize].kind)
+            .peekable();
+        kinds.peek().is_some() && kinds.all(|k| k == Kind::Mark)
+    };
+    let burns: Vec<_> = program.moves.iter().filter(|m| m.burns()).collect();
+    let marks: Vec<bool> = burns.iter().map(|m| of_mark(m)).collect();
+    let energy = |m: &super::Move| m.power / m.feed_mm_per_min.max(f64::MIN_POSITIVE);
+    let cuts = burns.iter().zip(&marks).filter(|(_, mark)| !**mark);
+    let gentlest = cuts.map(|(m, _)| energy(m)).fold(f64::INFINITY, f64::min);
+    if let Some((m, _)) = burns
+        .iter()
+        .zip(&marks)
+        .find(|(m, mark)| **mark && energy(m) >= gentlest)
+    {
+        findings.push(Finding::at(
+            m.line,
+            Rule::Engraving,
+            format!(
+                "the mark near {} gets as much power a millimetre as a cut: it would go through",
+                place(m.to)
+            ),
+        ));
     }
-}
-
-/// A stretch of a cut that is burnt too seldom or too often, as distances along the whole cut.
-#[derive(Clone, Copy)]
-struct Stretch {
-    from: f64,
-    to: f64,
-    /// How often it is burnt where that is worst.
-    count: i32,
-    /// A place on it.
-    at: Point,
-    /// It goes round a corner of the cut.
-    corner: bool,
-}
-
-impl Stretch {
-    /// Both as one; `next` begins where `self` ends.
-    fn joined(self, next: Self, worst: fn(i32, i32) -> i32) -> Self {
-        Self {
-            from: self.from,
-            to: next.to,
-            count: worst(self.count, next.count),
-            at: self.at,
-            corner: true,
-        }
-    }
-}
-
-/// The stretches of one cut: those that meet at a corner are one, because what is missing there is missing in one piece,
-/// however short the segments of a rounded corner are.
-struct Stretches {
-    all: Vec<Stretch>,
-    worst: fn(i32, i32) -> i32,
-}
-
-impl Stretches {
-    fn new(worst: fn(i32, i32) -> i32) -> Self {
-        Self {
-            all: Vec::new(),
-            worst,
-        }
-    }
-
-    /// Notes the next stretch: `run` of a segment that begins `before` mm after the cut's first point.
-    fn note(&mut self, segment: &Segment, before: f64, run: (f64, f64), count: i32) {
-        let new = Stretch {
-            from: before + run.0,
-            to: before + run.1,
-            count,
-            at: segment.at(0.5 * (run.0 + run.1)),
-            corner: false,
-        };
-        match self.all.last_mut() {
-            Some(last) if new.from - last.to <= NO_GAP_MM => *last = last.joined(new, self.worst),
-            _ => self.all.push(new),
-        }
-    }
-
-    /// The cut is a closed line of this length: what ends at its end goes on at its beginning.
-    fn close(&mut self, whole: f64) {
-        if let [first, .., last] = self.all.as_mut_slice()
-            && first.from <= NO_GAP_MM
-            && whole - last.to <= NO_GAP_MM
-        {
-            let mut tail = *last;
-            tail.from -= whole;
-            *first = tail.joined(*first, self.worst);
-            self.all.pop();
-        }
-    }
-
-    /// Total length, worst count and first place of the stretches longer than `least` says, and empties the list.
-    fn take(&mut self, least: impl Fn(&Stretch) -> f64) -> Option<(f64, i32, Point)> {
-        let mut found: Option<(f64, i32, Point)> = None;
-        for stretch in self.all.drain(..) {
-            let length = stretch.to - stretch.from;
-            if length > least(&stretch) {
-                let entry = found.get_or_insert((0.0, stretch.count, stretch.at));
-                entry.0 += length;
-                entry.1 = (self.worst)(entry.1, stretch.count);
-            }
-        }
-        found
-    }
+    marks
 }
 
 /// Judges what a machine has really burnt, as straight pieces in the sheet's frame, against the sheet: every cut as
@@ -416,6 +364,7 @@ pub fn compare_burnt(
     sheet: &Sheet,
     burnt: &[[Point; 2]],
     passes: u32,
+    declared: &Declared,
     gap_mm: f64,
 ) -> Result<Vec<Finding>, ToolpathError> {
     let burnt: Vec<(Option<usize>, Segment)> = burnt
@@ -423,126 +372,13 @@ pub fn compare_burnt(
         .map(|&[a, b]| (None, Segment { a, b }))
         .collect();
     let mut findings = Vec::new();
-    compare(&burnt, &Wanted::new(sheet)?, passes, gap_mm, &mut findings);
+    let wanted = Wanted::new(sheet, declared)?;
+    let outside = Outside::new(sheet, &wanted);
+    let scrap = |piece: &Segment| declared.leads && outside.is_scrap(piece);
+    compare(&burnt, &wanted, passes, gap_mm, &scrap, &mut findings);
     Ok(findings)
 }
 
-/// Compares burnt pieces, with their lines where there are lines, with what is wanted.
-fn compare(
-    burnt: &[(Option<usize>, Segment)],
-    wanted: &Wanted,
-    passes: u32,
-    gap_mm: f64,
-    findings: &mut Vec<Finding>,
-) {
-    let passes = passes as i32;
-    let burnt_index = Index::new(burnt.iter().map(|(_, s)| *s).collect());
-    let mut pieces = Pieces::default();
-    let mut missing = Stretches::new(i32::min);
-    let mut repeated = Stretches::new(i32::max);
-    for (name, range) in &wanted.cuts {
-        let mut whole = 0.0;
-        for segment in &wanted.segments[range.clone()] {
-            burnt_index.along(segment, TOLERANCE_MM, &mut pieces);
-            let length = segment.length();
-            pieces.runs(
-                true,
-                length,
-                0.0,
-                |n| n < passes,
-                |run, n| missing.note(segment, whole, run, n),
-            );
-            pieces.runs(
-                false,
-                length,
-                0.0,
-                |n| n > passes,
-                |run, n| repeated.note(segment, whole, run, n),
-            );
-            whole += length;
-        }
-        // A slit is one segment; every other cut is closed.
-        if range.len() > 1 {
-            missing.close(whole);
-            repeated.close(whole);
-        }
-        let missing = missing.take(|_| gap_mm);
-        // At a corner each of its two sides may lie within the tolerance of the other.
-        let repeated = repeated.take(|s| if s.corner { 2.0 * JOINT_MM } else { JOINT_MM });
-        let ends = (
-            wanted.segments[range.start].a,
-            wanted.segments[range.end - 1].b,
-        );
-        let describe = |found: (f64, i32, Point)| {
-            format!(
-                "{name} from {} to {} is cut {} over {} of its {} mm, near {}",
-                place(ends.0),
-                place(ends.1),
-                times(found.1),
-                short(found.0, 3),
-                short(whole, 3),
-                place(found.2)
-            )
-        };
-        if let Some(found) = missing {
-            findings.push(Finding {
-                line: None,
-                rule: Rule::Missing,
-                text: format!("{} instead of {}", describe(found), times(passes)),
-            });
-        }
-        if let Some(found) = repeated {
-            findings.push(Finding {
-                line: None,
-                rule: Rule::Repeated,
-                text: format!("{} instead of {}", describe(found), times(passes)),
-            });
-        }
-    }
-    let wanted_index = Index::new(wanted.segments.clone());
-    for (line, segment) in burnt {
-        wanted_index.along(segment, TOLERANCE_MM, &mut pieces);
-        let length = segment.length();
-        let mut stray: Option<(f64, Point)> = None;
-        if length <= NO_GAP_MM {
-            if pieces.capped.is_empty() {
-                stray = Some((0.0, segment.a));
-            }
-        } else {
-            pieces.runs(
-                true,
-                length,
-                NO_GAP_MM,
-                |n| n < 1,
-                |run, _| {
-                    let middle = segment.at(0.5 * (run.0 + run.1));
-                    stray.get_or_insert((0.0, middle)).0 += run.1 - run.0;
-                },
-            );
-        }
-        if let Some((length, at)) = stray {
-            findings.push(Finding {
-                line: *line,
-                rule: Rule::Stray,
-                text: format!(
-                    "{} mm are burnt where the sheet has no cut, near {}",
-                    short(length, 3),
-                    place(at)
-                ),
-            });
-        }
-    }
-}
-
-fn times(n: i32) -> String {
-    match n {
-        0 => "not at all".into(),
-        1 => "once".into(),
-        2 => "twice".into(),
-        n => format!("{n} times"),
-    }
-}
-
-fn place(p: Point) -> String {
+pub(super) fn place(p: Point) -> String {
     format!("({}, {})", short(p.x, 3), short(p.y, 3))
 }

@@ -5,7 +5,7 @@ use kurbo::Point;
 use crate::base::units::short;
 use crate::machine::{Machine, PowerMode};
 use crate::material::Material;
-use crate::toolpath::{Role, Toolpath};
+use crate::toolpath::{CHORD_ERROR_MM, Cut, Role, Toolpath};
 
 /// Micrometres: GRBL prints and keeps no more, and the verifier tolerates ten.
 const DECIMALS: usize = 3;
@@ -91,8 +91,45 @@ const MACHINE_LINE: &str = "; machine ";
 /// How the header says how often each cut is gone over; left out for once.
 const PASSES_LINE: &str = "; passes ";
 
+/// What else the header says for the verifier; left out where it does not apply.
+const LEADS_LINE: &str = "; leads";
+const MARKS_LINE: &str = "; marks";
+const OVERCUT_LINE: &str = "; overcut ";
+const PIERCE_LINE: &str = "; pierce ";
+
 /// Lines of a text that may be its header.
-const HEADER_LINES: usize = 8;
+const HEADER_LINES: usize = 16;
+
+/// What a job says of itself in its header, for those who judge it: without the words, none of these is accepted.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Declared {
+    /// It burns leads in scrap.
+    pub leads: bool,
+    /// It engraves the sheet's marks.
+    pub marks: bool,
+    /// It cuts contours this far beyond their start, millimetres.
+    pub overcut_mm: f64,
+    /// Its pierce holes have this diameter, millimetres; 0 if they are no wider than the kerf.
+    pub pierce_mm: f64,
+}
+
+impl Declared {
+    /// As the header of a text says.
+    pub fn of(text: &str) -> Self {
+        let header = || text.lines().take(HEADER_LINES);
+        let has = |line: &str| header().any(|l| l.trim_end() == line);
+        let number = |start: &str| {
+            let found = header().find_map(|l| l.strip_prefix(start)?.trim().parse::<f64>().ok());
+            found.filter(|v| (0.0..1000.0).contains(v)).unwrap_or(0.0)
+        };
+        Self {
+            leads: has(LEADS_LINE),
+            marks: has(MARKS_LINE),
+            overcut_mm: number(OVERCUT_LINE),
+            pierce_mm: number(PIERCE_LINE),
+        }
+    }
+}
 
 /// How often a job goes over each cut, from its header: `None` where it does not say so, which in our own jobs means
 /// once.
@@ -148,6 +185,22 @@ pub fn write(
     {
         w.line(format!("{PASSES_LINE}{passes}"));
     }
+    let any = |of: &dyn Fn(&Cut) -> bool| toolpath.cuts.iter().any(of);
+    if any(&|c| c.lead_in.is_some() || c.lead_out.is_some()) {
+        w.line(LEADS_LINE);
+    }
+    if any(&|c| c.role == Role::Mark) {
+        w.line(MARKS_LINE);
+    }
+    if toolpath.overcut_mm > 0.0 {
+        w.line(format!(
+            "{OVERCUT_LINE}{}",
+            short(toolpath.overcut_mm, DECIMALS)
+        ));
+    }
+    if let Some(pierce_mm) = toolpath.pierce_mm {
+        w.line(format!("{PIERCE_LINE}{}", short(pierce_mm, DECIMALS)));
+    }
     w.line(format!(
         "; {} strokes, cut {} mm, travel {} mm",
         figures.strokes,
@@ -169,24 +222,31 @@ pub fn write(
     w.power = "0".into();
     let mut role = None;
     for cut in &toolpath.cuts {
-        if let Some(bad) = cut.points.iter().find(|p| !p.is_finite()) {
-            return Err(GcodeError::NotFinite { x: bad.x, y: bad.y });
+        let curves = [cut.lead_in.as_ref(), Some(&cut.line), cut.lead_out.as_ref()];
+        if let Some(curve) = curves.into_iter().flatten().find(|c| !c.is_finite()) {
+            let bad = curve.vertices.iter().find(|v| !v.at.is_finite());
+            let at = bad
+                .or(curve.vertices.first())
+                .map_or(Point::ORIGIN, |v| v.at);
+            return Err(GcodeError::NotFinite { x: at.x, y: at.y });
         }
         if role != Some(cut.role) {
             role = Some(cut.role);
-            w.line(match cut.role {
-                Role::Slit => "; slits",
-                Role::Inner => "; holes",
-                Role::Outer => "; rim",
-            });
+            w.line(format!("; {}", cut.role.word()));
         }
         let feed = short(cut.feed_mm_per_min, 0);
         // Hundredths of a per cent and better, whatever the scale of S.
         let power = short(laser.s_max * cut.power_percent / 100.0, 1);
-        for (i, point) in cut.passes().enumerate() {
+        for (i, step) in cut.steps().into_iter().enumerate() {
             if i == 0 {
-                w.go("G0", point, None);
+                w.go("G0", step.piece.from, None);
+            }
+            let feed = if step.speed_percent == 100.0 {
+                feed.clone()
             } else {
+                short(cut.feed_mm_per_min * step.speed_percent / 100.0, 0)
+            };
+            for point in step.piece.chords(CHORD_ERROR_MM) {
                 w.go("G1", point, Some((&feed, &power)));
             }
         }

@@ -15,7 +15,7 @@ use crate::machine::{Machine, PowerMode};
 use crate::material::{CutSetting, Material};
 use crate::pattern::Sheet;
 use crate::sim::{RehearsalSummary, Settings, rehearse};
-use crate::toolpath::{Toolpath, plan};
+use crate::toolpath::{CutOptions, Toolpath, plan};
 
 /// A job and what was found about it.
 #[derive(Debug)]
@@ -61,7 +61,8 @@ pub(crate) fn cut(
     progress: &dyn Progress,
 ) -> Result<CutResult, MakeError> {
     progress.start("toolpath", None);
-    let toolpath = plan(sheet, setting, machine.park_mm()).map_err(MakeError::Toolpath)?;
+    let toolpath =
+        plan(sheet, &CutOptions::of(setting), machine.park_mm()).map_err(MakeError::Toolpath)?;
     progress.check()?;
     let gcode = gcode::write(&toolpath, machine, material).map_err(MakeError::Gcode)?;
 
@@ -94,8 +95,14 @@ pub(crate) fn cut(
         .filter(|b| !b.standing())
         .map(|b| [b.from_mm, b.to_mm].map(|p| Point::new(p[0], p[1])))
         .collect();
-    let differences = compare_burnt(sheet, &burnt, setting.passes, stop_gap_mm(machine))
-        .map_err(MakeError::Toolpath)?;
+    let differences = compare_burnt(
+        sheet,
+        &burnt,
+        setting.passes,
+        &gcode::Declared::of(&gcode),
+        stop_gap_mm(machine),
+    )
+    .map_err(MakeError::Toolpath)?;
     objections.extend(listed(
         "the simulated machine did not burn the sheet",
         differences.iter().map(ToString::to_string),

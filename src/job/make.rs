@@ -440,13 +440,16 @@ fn profile_name(name: &str, folder: &Path) -> String {
     }
 }
 
+/// Arcs in the report, millimetres: far below a pixel.
+const DRAWN_CHORD_MM: f64 = 0.02;
+
 /// The toolpath as the report draws it: cuts in their order, with the moves between them.
 fn drawn(toolpath: &Toolpath) -> Vec<Stroke> {
     let flat = |p: kurbo::Point| Point2::new(p.x, p.y);
     let mut strokes = Vec::with_capacity(2 * toolpath.cuts.len());
     let mut at = toolpath.start;
     for cut in &toolpath.cuts {
-        let (Some(&first), Some(end)) = (cut.points.first(), cut.end()) else {
+        let (Some(first), Some(end)) = (cut.start(), cut.end()) else {
             continue;
         };
         strokes.push(Stroke {
@@ -454,12 +457,18 @@ fn drawn(toolpath: &Toolpath) -> Vec<Stroke> {
             points: vec![flat(at), flat(first)],
         });
         let role = match cut.role {
+            Role::Mark => report::Role::Mark,
             Role::Slit => report::Role::Cut,
             Role::Inner | Role::Outer => report::Role::Contour,
         };
         strokes.push(Stroke {
             role,
-            points: cut.points.iter().copied().map(flat).collect(),
+            points: [&cut.lead_in, &Some(cut.line.clone()), &cut.lead_out]
+                .into_iter()
+                .flatten()
+                .flat_map(|line| line.flattened(DRAWN_CHORD_MM))
+                .map(flat)
+                .collect(),
         });
         at = end;
     }

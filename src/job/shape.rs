@@ -19,7 +19,7 @@ use crate::conformal::{FlattenOptions, Flattened, Layout, Sizing};
 use crate::linkage::{Built, Flaps, Linkage, LinkageOptions, build_without, fit};
 use crate::machine::Machine;
 use crate::mesh::Surface;
-use crate::pattern::{self, PatternError, Sheet};
+use crate::pattern::{self, PatternError, Sheet, SheetOptions};
 use crate::rationalize::{Effort, Quality, STAGE_COUNT, failing, rationalize};
 
 /// What the sheet is to be, whatever its shape.
@@ -210,8 +210,8 @@ fn solve(
     let mut flaps_too_large = false;
     if built.overlaps.is_empty() {
         let draw = |flaps: &Flaps| {
-            let (hinge, kerf) = (stock.hinge_width_mm, stock.kerf_mm);
-            let drawn = Sheet::with_flaps(&built.linkage, flaps, hinge, kerf)?;
+            let options = SheetOptions::plain(stock.hinge_width_mm, stock.kerf_mm);
+            let drawn = Sheet::with_flaps(&built.linkage, flaps, &options)?;
             pattern::placed(&drawn, stock.machine, request.mirror)
         };
         let mut drawn = draw(&flaps);

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use kurbo::Point;
 
-use super::sheet::{Contour, PatternError, signed_area};
+use super::sheet::{Contour, PatternError};
+use crate::base::curve::{Curve, Piece};
 use crate::base::ids::{Id, Per};
 use crate::linkage::TriangleId;
 
@@ -50,9 +51,9 @@ pub(super) fn trace(
             let at = sides[side].0;
             return Err(PatternError::OpenRim { x: at.x, y: at.y });
         }
-        let points = merge_collinear(&points);
-        let outer = signed_area(&points) > 0.0;
-        contours.push(Contour { points, outer });
+        let line = Curve::polyline(merge_collinear(&points), true);
+        let outer = line.signed_area() > 0.0;
+        contours.push(Contour { line, outer });
     }
     Ok(contours)
 }
@@ -142,5 +143,71 @@ fn merge_collinear(points: &[Point]) -> Vec<Point> {
         points.to_vec()
     } else {
         kept
+    }
+}
+
+/// A closed line of straight pieces with its convex corners rounded to a radius; less where a side is too short for two
+/// fillets. In concave corners the beam itself leaves a fillet.
+pub(super) fn rounded(line: &Curve, radius_mm: f64) -> Curve {
+    if radius_mm <= 0.0 {
+        return line.clone();
+    }
+    let points: Vec<Point> = line.vertices.iter().map(|v| v.at).collect();
+    let n = points.len();
+    let mut pieces: Vec<Piece> = Vec::with_capacity(2 * n);
+    // For each corner where its fillet begins and ends, and the fillet's bulge.
+    let corner = |i: usize| {
+        let (before, here, after) = (points[(i + n - 1) % n], points[i], points[(i + 1) % n]);
+        let (u, v) = ((here - before).normalize(), (after - here).normalize());
+        let turn = u.cross(v).atan2(u.dot(v));
+        if turn < 1e-6 {
+            return (here, here, 0.0);
+        }
+        let half = (0.5 * turn).tan();
+        let room = 0.5 * (here - before).hypot().min((after - here).hypot());
+        let back = (radius_mm * half).min(room);
+        (here - u * back, here + v * back, (0.25 * turn).tan())
+    };
+    for i in 0..n {
+        let (from, to, bulge) = corner(i);
+        if from != to {
+            pieces.push(Piece::new(from, to, bulge));
+        }
+        let (next, ..) = corner((i + 1) % n);
+        if to.distance(next) > SAME_POINT {
+            pieces.push(Piece::new(to, next, 0.0));
+        }
+    }
+    let mut round = Curve::of_pieces(pieces);
+    round.vertices.pop();
+    round.closed = true;
+    round
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+
+    #[test]
+    fn rounding_takes_the_known_area_from_each_convex_corner_and_none_from_the_others() {
+        // An L: five convex corners and a concave one.
+        let l = [(0., 0.), (4., 0.), (4., 2.), (2., 2.), (2., 4.), (0., 4.)];
+        let sharp = Curve::polyline(l.map(Point::from), true);
+        for r in [0.1, 0.5, 0.99] {
+            let round = rounded(&sharp, r);
+            let lost = 5.0 * (1.0 - PI / 4.0) * r * r;
+            assert!((sharp.signed_area() - round.signed_area() - lost).abs() < 1e-9);
+            assert_eq!(round.pieces().filter(|p| p.arc().is_some()).count(), 5);
+        }
+        // Too round for the short sides: as round as they allow.
+        let most = rounded(&sharp, 50.0);
+        assert!(
+            most.pieces()
+                .filter_map(|p| p.arc())
+                .all(|a| a.radius <= 1.0 + 1e-9 || a.radius > 1.9)
+        );
+        assert!(most.is_finite() && most.signed_area() > 0.0);
     }
 }

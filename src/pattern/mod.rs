@@ -1,4 +1,4 @@
-//! Stage 5: a linkage becomes the sheet that is cut: slits, contours, and the drawing of both.
+//! Stage 5: a linkage becomes the sheet that is cut: slits, contours, marks, and the drawing of all.
 //!
 //! A [`Sheet`] is what the finished part looks like: slits as centre lines, contours as the exact edge that remains.
 //! Width of the beam matters twice: it sets where a slit must stop so that its ligament is exactly the hinge width,
@@ -6,10 +6,19 @@
 //! the beam strikes; material on the left of every contour.
 
 mod contour;
+mod font;
+mod mark;
 mod place;
 mod sheet;
+mod star;
 mod svg;
+mod tabs;
 
+pub use font::{can_write, width_mm};
+pub use mark::{Label, Mark, MarkKind};
 pub use place::{Motion, placed};
-pub use sheet::{Contour, Figures, MAX_NECK, PatternError, Sheet, SheetMetadata, Slit};
+pub use sheet::{
+    Contour, Figures, MAX_NECK, PatternError, Sheet, SheetMetadata, SheetOptions, Slit, Tab, Tip,
+};
+pub use star::{Arm, Star};
 pub use svg::{SvgError, read_svg, svg};

@@ -37,10 +37,16 @@ impl Motion {
             slit.tip = self.point(slit.tip);
         }
         for contour in &mut moved.contours {
-            contour.points.iter_mut().for_each(|p| *p = self.point(*p));
+            contour.line = contour.line.moved(|p| self.point(p), self.mirror);
             if self.mirror {
-                contour.points.reverse();
+                contour.line = contour.line.reversed();
             }
+        }
+        for mark in &mut moved.marks {
+            *mark = mark.moved(|p| self.point(p), self.mirror);
+        }
+        for tab in &mut moved.tabs {
+            tab.at = self.point(tab.at);
         }
         for triangle in moved.triangles.iter_mut().chain(&mut moved.flaps) {
             *triangle = triangle.map(|p| self.point(p));
@@ -107,6 +113,7 @@ pub fn placed(
 
 #[cfg(test)]
 mod tests {
+    use super::super::sheet::SheetOptions;
     use super::*;
     use crate::linkage::{Colour, Handedness, Linkage};
 
@@ -114,7 +121,8 @@ mod tests {
         let cells: Vec<_> = (0..length)
             .flat_map(|i| [(i, 0, Colour::Up), (i, 0, Colour::Down)])
             .collect();
-        Sheet::new(&Linkage::patch(edge, Handedness::Right, &cells), 1.0, 0.2).unwrap()
+        let linkage = Linkage::patch(edge, Handedness::Right, &cells);
+        Sheet::new(&linkage, &SheetOptions::plain(1.0, 0.2)).unwrap()
     }
 
     #[test]

@@ -1,11 +1,17 @@
 //! Slits whose ligaments are exactly as wide as asked, and the sheet around them.
+//!
+//! All widths are those of the finished part: the kerf and the shape of the slits' tips are taken off before, so that a
+//! ligament is what was asked for, whatever burns it.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use kurbo::{Point, Rect};
+use kurbo::{Point, Rect, Vec2};
 
 use super::contour;
+use super::mark::Mark;
+use super::star;
+use crate::base::curve::Curve;
 use crate::base::ids::{Id, Per};
 use crate::base::union::Union;
 use crate::linkage::{Flaps, Linkage, Triangle, TriangleId};
@@ -15,6 +21,9 @@ use crate::linkage::{Flaps, Linkage, Triangle, TriangleId};
 /// Up to 2/3 the narrowest ligament is the one that the formula knows; beyond 1/2 the slit is shorter than its neck, the
 /// triangles hardly turn, and nothing of the linkage is left.
 pub const MAX_NECK: f64 = 0.5;
+
+/// Largest part of a slit that its widened end may take.
+const TIP_SHARE: f64 = 0.8;
 
 /// One slit: an open cut on its centre line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,13 +38,83 @@ pub struct Slit {
     pub flap: bool,
 }
 
-/// A closed edge of the finished part, first point not repeated, material on the left.
+/// A closed edge of the finished part, material on the left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contour {
-    /// Corners, at least three, no two neighbouring edges collinear.
-    pub points: Vec<Point>,
+    /// The edge: closed, straight pieces and arcs, no two neighbouring straight ones collinear.
+    pub line: Curve,
     /// True: counter-clockwise, the rim of a part. False: clockwise, a hole.
     pub outer: bool,
+}
+
+/// A short uncut stretch of a contour that holds the part in the stock until a person breaks it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tab {
+    /// Its middle, on a contour.
+    pub at: Point,
+    /// What remains uncut, millimetres.
+    pub width_mm: f64,
+}
+
+/// The shape of a slit's end before its hinge. A wide round end spreads the bend of the two ligaments over a longer way
+/// and starts no crack.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Tip {
+    /// As the beam leaves it: round, half a kerf in radius.
+    #[default]
+    Plain,
+    /// A round hole.
+    Round {
+        /// Its finished radius, millimetres.
+        radius_mm: f64,
+    },
+    /// A round hole into which the slit widens along tangents, so that no corner is left between the two.
+    Teardrop {
+        /// The finished radius of its round end, millimetres.
+        radius_mm: f64,
+    },
+}
+
+impl Tip {
+    /// Radius of the finished end for a kerf, millimetres: no end is finer than the beam.
+    pub fn radius_mm(self, kerf_mm: f64) -> f64 {
+        match self {
+            Self::Plain => 0.5 * kerf_mm,
+            Self::Round { radius_mm } | Self::Teardrop { radius_mm } => {
+                radius_mm.max(0.5 * kerf_mm)
+            }
+        }
+    }
+}
+
+/// What is asked of a sheet besides its linkage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SheetOptions {
+    /// Width h of the narrowest ligament, millimetres.
+    pub hinge_width_mm: f64,
+    /// Width k of the cut, millimetres.
+    pub kerf_mm: f64,
+    /// Shape of the slits' ends.
+    pub tip: Tip,
+    /// Finished radius of the triangles' corners, at the centres of stars and on the rim, millimetres; 0 leaves them
+    /// sharp.
+    pub corner_radius_mm: f64,
+    /// Diameter of a hole in the middle of every flap triangle and of its double, for a pin or a rivet, millimetres;
+    /// 0 for none.
+    pub alignment_hole_mm: f64,
+}
+
+impl SheetOptions {
+    /// Plain slits and corners.
+    pub fn plain(hinge_width_mm: f64, kerf_mm: f64) -> Self {
+        Self {
+            hinge_width_mm,
+            kerf_mm,
+            tip: Tip::Plain,
+            corner_radius_mm: 0.0,
+            alignment_hole_mm: 0.0,
+        }
+    }
 }
 
 /// The numbers that belong to a sheet and not to its drawing.
@@ -47,6 +126,10 @@ pub struct SheetMetadata {
     pub kerf_mm: f64,
     /// Triangle edge L, millimetres.
     pub edge_mm: f64,
+    /// Shape of the slits' ends.
+    pub tip: Tip,
+    /// Finished radius of the triangles' corners, millimetres.
+    pub corner_radius_mm: f64,
 }
 
 /// A sheet to be cut.
@@ -60,7 +143,11 @@ pub struct Sheet {
     pub triangles: Vec<[Point; 3]>,
     /// The flap triangles of doubled rows along the seam, for the eye; their slits and edges are among the others.
     pub flaps: Vec<[Point; 3]>,
-    /// Hinge width, kerf, edge.
+    /// What is engraved.
+    pub marks: Vec<Mark>,
+    /// Where contours are interrupted.
+    pub tabs: Vec<Tab>,
+    /// Hinge width, kerf, edge, shapes of tips and corners.
     pub metadata: SheetMetadata,
 }
 
@@ -105,11 +192,47 @@ pub enum PatternError {
         /// The value.
         value_mm: f64,
     },
+    /// A radius, diameter or the like is negative or not a number.
+    #[error("the {what} is {value_mm} mm; it must be a plain number, 0 or above")]
+    Size {
+        /// `corner radius`, `alignment hole`, `tip radius`.
+        what: &'static str,
+        /// The value.
+        value_mm: f64,
+    },
+    /// A rounded corner would thin out the hinge beside it.
+    #[error(
+        "corners rounded to {corner_radius_mm} mm would thin out the hinges; with a hinge of {hinge_width_mm} mm and tips of {tip_radius_mm:.3} mm they can have {most_mm:.3} mm (corner_radius_mm in the material's profile)"
+    )]
+    CornerTooRound {
+        /// The radius asked for.
+        corner_radius_mm: f64,
+        /// Hinge width.
+        hinge_width_mm: f64,
+        /// Radius of the slits' ends.
+        tip_radius_mm: f64,
+        /// The largest radius that leaves the hinges alone.
+        most_mm: f64,
+    },
+    /// An alignment hole would leave too little of its triangle.
+    #[error(
+        "an alignment hole of {hole_mm} mm leaves less than a hinge's width around it in triangles of {edge_mm:.3} mm: {most_mm:.3} mm is the most"
+    )]
+    HoleTooWide {
+        /// Its diameter.
+        hole_mm: f64,
+        /// Edge of the triangles.
+        edge_mm: f64,
+        /// The largest diameter.
+        most_mm: f64,
+    },
     /// The ligaments leave no room for slits.
     #[error(
-        "a hinge {hinge_width_mm} mm wide and a kerf of {kerf_mm} mm need triangles with edges of {least_edge_mm:.3} mm or more; these have {edge_mm:.3} mm. Make the triangles larger (--edge, or fewer --triangles){}", narrower(*.largest_hinge_mm)
+        "a hinge {hinge_width_mm} mm wide, a kerf of {kerf_mm} mm{} need triangles with edges of {least_edge_mm:.3} mm or more; these have {edge_mm:.3} mm. Make the triangles larger (--edge, or fewer --triangles){}", with_tip(*.tip_radius_mm), narrower(*.largest_hinge_mm)
     )]
     TooWide {
+        /// Radius of a slit's widened end, or 0.
+        tip_radius_mm: f64,
         /// Hinge width asked for.
         hinge_width_mm: f64,
         /// Kerf.
@@ -163,6 +286,14 @@ pub enum PatternError {
     },
 }
 
+fn with_tip(tip_radius_mm: f64) -> String {
+    if tip_radius_mm > 0.0 {
+        format!(" and tips of radius {tip_radius_mm} mm")
+    } else {
+        String::new()
+    }
+}
+
 fn narrower(largest_hinge_mm: f64) -> String {
     if largest_hinge_mm > 0.0 {
         format!(", or the hinge at most {largest_hinge_mm:.3} mm wide (--hinge)")
@@ -180,26 +311,62 @@ pub(super) fn check_width(what: &'static str, value_mm: f64) -> Result<(), Patte
     }
 }
 
+/// Checks a size that may be zero.
+fn check_size(what: &'static str, value_mm: f64) -> Result<(), PatternError> {
+    if value_mm.is_finite() && value_mm >= 0.0 {
+        Ok(())
+    } else {
+        Err(PatternError::Size { what, value_mm })
+    }
+}
+
 impl SheetMetadata {
-    /// How far before its hinge a slit stops: c = (2/√3)(h + k).
+    /// How far before its hinge a slit's tip has its centre: c = (2/√3)(h + k/2 + r) for a finished tip of radius r,
+    /// which is k/2 for a plain one.
     ///
-    /// The neighbouring arms leave the hinge's vertex at ±60° from the slit, so its tip is c · sin 60° = h + k from
-    /// their centre lines: half a kerf is burnt from each side, and h remains.
+    /// The neighbouring arms leave the hinge's vertex at ±60° from the slit, so the tip's centre is c · sin 60° =
+    /// h + k/2 + r from their centre lines: r is the tip's own, half a kerf the arm's, and h remains.
     pub fn neck_mm(&self) -> f64 {
-        (self.hinge_width_mm + self.kerf_mm) / 0.75f64.sqrt()
+        let tip = self.tip.radius_mm(self.kerf_mm);
+        (self.hinge_width_mm + 0.5 * self.kerf_mm + tip) / 0.75f64.sqrt()
+    }
+
+    /// The largest finished radius of corners that leaves the ligaments alone: h + r.
+    ///
+    /// A fillet in a corner of 120° begins ρ/√3 from it and a ligament's foot on the arm is c/2 away; on centre lines
+    /// that is (ρ + k/2)/√3 ≤ c/2.
+    pub fn most_corner_mm(&self) -> f64 {
+        self.hinge_width_mm + self.tip.radius_mm(self.kerf_mm)
     }
 
     fn check(&self) -> Result<(), PatternError> {
         check_width("hinge width", self.hinge_width_mm)?;
         check_width("kerf", self.kerf_mm)?;
         check_width("edge length", self.edge_mm)?;
-        if self.neck_mm() > MAX_NECK * self.edge_mm {
+        check_size("tip radius", self.tip.radius_mm(0.0))?;
+        check_size("corner radius", self.corner_radius_mm)?;
+        // Room for the neck, and for a wide tip on the slit that remains.
+        let least =
+            (self.neck_mm() / MAX_NECK).max(self.neck_mm() + star::tip_reach_mm(self) / TIP_SHARE);
+        if least > self.edge_mm {
+            let tip = self.tip.radius_mm(self.kerf_mm);
             return Err(PatternError::TooWide {
+                tip_radius_mm: if self.tip == Tip::Plain { 0.0 } else { tip },
                 hinge_width_mm: self.hinge_width_mm,
                 kerf_mm: self.kerf_mm,
                 edge_mm: self.edge_mm,
-                least_edge_mm: self.neck_mm() / MAX_NECK,
-                largest_hinge_mm: MAX_NECK * self.edge_mm * 0.75f64.sqrt() - self.kerf_mm,
+                least_edge_mm: least,
+                largest_hinge_mm: MAX_NECK * self.edge_mm * 0.75f64.sqrt()
+                    - 0.5 * self.kerf_mm
+                    - tip,
+            });
+        }
+        if self.corner_radius_mm > self.most_corner_mm() {
+            return Err(PatternError::CornerTooRound {
+                corner_radius_mm: self.corner_radius_mm,
+                hinge_width_mm: self.hinge_width_mm,
+                tip_radius_mm: self.tip.radius_mm(self.kerf_mm),
+                most_mm: self.most_corner_mm(),
             });
         }
         Ok(())
@@ -207,12 +374,12 @@ impl SheetMetadata {
 }
 
 impl Sheet {
-    /// The sheet of a linkage in the frame of its flat positions, for a hinge width and a kerf.
+    /// The sheet of a linkage in the frame of its flat positions.
     ///
     /// # Errors
     /// [`PatternError`]: nothing to cut, widths that the triangles do not allow, a layout that overlaps itself.
-    pub fn new(linkage: &Linkage, hinge_width_mm: f64, kerf_mm: f64) -> Result<Self, PatternError> {
-        Self::with_flaps(linkage, &Flaps::default(), hinge_width_mm, kerf_mm)
+    pub fn new(linkage: &Linkage, options: &SheetOptions) -> Result<Self, PatternError> {
+        Self::with_flaps(linkage, &Flaps::default(), options)
     }
 
     /// As [`Sheet::new`], with doubled rows along the seam, which are cut like all else.
@@ -222,13 +389,14 @@ impl Sheet {
     pub fn with_flaps(
         linkage: &Linkage,
         flaps: &Flaps,
-        hinge_width_mm: f64,
-        kerf_mm: f64,
+        options: &SheetOptions,
     ) -> Result<Self, PatternError> {
         let metadata = SheetMetadata {
-            hinge_width_mm,
-            kerf_mm,
+            hinge_width_mm: options.hinge_width_mm,
+            kerf_mm: options.kerf_mm,
             edge_mm: linkage.edge_mm,
+            tip: options.tip,
+            corner_radius_mm: options.corner_radius_mm,
         };
         metadata.check()?;
         if linkage.triangles.is_empty() {
@@ -247,22 +415,26 @@ impl Sheet {
             .collect();
         check_overlap(&triangles, linkage.edge_mm)?;
         let neighbours = whole.flat_neighbours();
+        let mut contours = contour::trace(&triangles, &neighbours, linkage.edge_mm)?;
+        for contour in &mut contours {
+            contour.line = contour::rounded(&contour.line, metadata.corner_radius_mm);
+        }
+        contours.extend(alignment_holes(&triangles, flaps, own, &metadata, options)?);
         Ok(Self {
             slits: slits(&whole, &neighbours, metadata.neck_mm(), own),
-            contours: contour::trace(&triangles, &neighbours, linkage.edge_mm)?,
+            contours,
             flaps: triangles.split_off(own),
             triangles,
+            marks: Vec::new(),
+            tabs: Vec::new(),
             metadata,
         })
     }
 
     /// The smallest rectangle around all contours.
     pub fn bounds(&self) -> Rect {
-        let mut points = self.contours.iter().flat_map(|c| &c.points);
-        let Some(first) = points.next() else {
-            return Rect::ZERO;
-        };
-        points.fold(Rect::from_points(*first, *first), |r, p| r.union_pt(*p))
+        let all = self.contours.iter().filter_map(|c| c.line.bounds());
+        all.reduce(|a, b| a.union(b)).unwrap_or(Rect::ZERO)
     }
 
     /// Counts, lengths, area.
@@ -281,29 +453,52 @@ impl Sheet {
                 .unwrap_or(0),
             contours: self.contours.len(),
             slit_length_mm: self.slits.iter().map(|s| s.tail.distance(s.tip)).sum(),
-            contour_length_mm: self
-                .contours
-                .iter()
-                .flat_map(|c| edges(&c.points))
-                .map(|(a, b)| a.distance(b))
-                .sum(),
-            area_mm2: self.contours.iter().map(|c| signed_area(&c.points)).sum(),
+            contour_length_mm: self.contours.iter().map(|c| c.line.length()).sum(),
+            area_mm2: self.contours.iter().map(|c| c.line.signed_area()).sum(),
             width_mm: bounds.width(),
             height_mm: bounds.height(),
         }
     }
 }
 
-/// The sides of a closed polyline.
-pub(crate) fn edges(points: &[Point]) -> impl Iterator<Item = (Point, Point)> + '_ {
-    (0..points.len()).map(|i| (points[i], points[(i + 1) % points.len()]))
-}
-
-/// Area inside a closed polyline, negative if it runs clockwise.
-pub(crate) fn signed_area(points: &[Point]) -> f64 {
-    edges(points)
-        .map(|(a, b)| 0.5 * a.to_vec2().cross(b.to_vec2()))
-        .sum()
+/// Round holes in the middle of every flap triangle and of the triangle that it is glued on.
+fn alignment_holes(
+    triangles: &[[Point; 3]],
+    flaps: &Flaps,
+    own: usize,
+    metadata: &SheetMetadata,
+    options: &SheetOptions,
+) -> Result<Vec<Contour>, PatternError> {
+    check_size("alignment hole", options.alignment_hole_mm)?;
+    if options.alignment_hole_mm == 0.0 {
+        return Ok(Vec::new());
+    }
+    let inradius = metadata.edge_mm / 12f64.sqrt();
+    let most = 2.0 * (inradius - 0.5 * metadata.kerf_mm - metadata.hinge_width_mm);
+    if options.alignment_hole_mm > most {
+        return Err(PatternError::HoleTooWide {
+            hole_mm: options.alignment_hole_mm,
+            edge_mm: metadata.edge_mm,
+            most_mm: most.max(0.0),
+        });
+    }
+    let mut places: Vec<usize> = (own..triangles.len()).collect();
+    places.extend(flaps.flaps.iter().map(|f| f.double.index()));
+    places.sort_unstable();
+    places.dedup();
+    let middle = |t: &[Point; 3]| {
+        let sum: Vec2 = t.iter().fold(Vec2::ZERO, |s, p| s + p.to_vec2());
+        (sum / 3.0).to_point()
+    };
+    let hole = |t: usize| Contour {
+        line: Curve::circle(
+            middle(&triangles[t]),
+            0.5 * options.alignment_hole_mm,
+            false,
+        ),
+        outer: false,
+    };
+    Ok(places.into_iter().map(hole).collect())
 }
 
 /// The slits of all hinges that the sheet does not cut open, star by star, in each those along flaps last. The flap
@@ -414,7 +609,8 @@ mod tests {
     fn a_hexagon_has_the_counted_slits_area_and_rim() {
         for radius in 1..5 {
             let (edge, hinge, kerf) = (10.0, 0.8, 0.2);
-            let sheet = Sheet::new(&hexagon(radius, edge), hinge, kerf).unwrap();
+            let sheet =
+                Sheet::new(&hexagon(radius, edge), &SheetOptions::plain(hinge, kerf)).unwrap();
             let f = sheet.figures();
             let (triangles, r) = (6 * radius * radius, f64::from(radius));
             assert_eq!(f.triangles as i32, triangles);
@@ -427,7 +623,7 @@ mod tests {
             );
             assert!((f.contour_length_mm - 6.0 * r * edge).abs() < 1e-9);
             assert_eq!(sheet.contours.len(), 1);
-            assert_eq!(sheet.contours[0].points.len(), 6, "collinear sides are one");
+            assert_eq!(sheet.contours[0].line.len(), 6, "collinear sides are one");
             assert!(sheet.contours[0].outer);
             // Every inner vertex is a star of three.
             let mut sizes = vec![0; f.stars];
@@ -444,7 +640,7 @@ mod tests {
         for (hinge, kerf) in [(0.5, 0.2), (1.0, 0.1), (1.7, 0.4)] {
             for handedness in [Handedness::Right, Handedness::Left] {
                 let linkage = Linkage::patch(5.0, handedness, &Linkage::hexagon_cells(3));
-                let sheet = Sheet::new(&linkage, hinge, kerf).unwrap();
+                let sheet = Sheet::new(&linkage, &SheetOptions::plain(hinge, kerf)).unwrap();
                 let mut narrowest = f64::INFINITY;
                 for (i, slit) in sheet.slits.iter().enumerate() {
                     for other in sheet
@@ -465,7 +661,7 @@ mod tests {
 
     #[test]
     fn widths_that_leave_no_slit_are_refused_with_what_would_do() {
-        let error = Sheet::new(&hexagon(2, 2.0), 1.0, 0.2).unwrap_err();
+        let error = Sheet::new(&hexagon(2, 2.0), &SheetOptions::plain(1.0, 0.2)).unwrap_err();
         let PatternError::TooWide {
             least_edge_mm,
             largest_hinge_mm,
@@ -474,9 +670,27 @@ mod tests {
         else {
             panic!("{error}");
         };
-        assert!(Sheet::new(&hexagon(2, least_edge_mm * 1.0001), 1.0, 0.2).is_ok());
-        assert!(Sheet::new(&hexagon(2, 2.0), largest_hinge_mm * 0.9999, 0.2).is_ok());
-        assert!(Sheet::new(&hexagon(2, 2.0), largest_hinge_mm * 1.0001, 0.2).is_err());
+        assert!(
+            Sheet::new(
+                &hexagon(2, least_edge_mm * 1.0001),
+                &SheetOptions::plain(1.0, 0.2)
+            )
+            .is_ok()
+        );
+        assert!(
+            Sheet::new(
+                &hexagon(2, 2.0),
+                &SheetOptions::plain(largest_hinge_mm * 0.9999, 0.2)
+            )
+            .is_ok()
+        );
+        assert!(
+            Sheet::new(
+                &hexagon(2, 2.0),
+                &SheetOptions::plain(largest_hinge_mm * 1.0001, 0.2)
+            )
+            .is_err()
+        );
         for (h, k) in [
             (0.0, 0.1),
             (f64::NAN, 0.1),
@@ -484,12 +698,15 @@ mod tests {
             (1.0, f64::INFINITY),
         ] {
             assert!(matches!(
-                Sheet::new(&hexagon(2, 9.0), h, k),
+                Sheet::new(&hexagon(2, 9.0), &SheetOptions::plain(h, k)),
                 Err(PatternError::Width { .. })
             ));
         }
         assert_eq!(
-            Sheet::new(&Linkage::patch(9.0, Handedness::Right, &[]), 1.0, 0.1),
+            Sheet::new(
+                &Linkage::patch(9.0, Handedness::Right, &[]),
+                &SheetOptions::plain(1.0, 0.1)
+            ),
             Err(PatternError::Empty)
         );
     }
@@ -499,7 +716,7 @@ mod tests {
         let mut linkage = hexagon(2, 9.0);
         linkage.triangles[TriangleId(5)].flat = linkage.triangles[TriangleId(0)].flat;
         assert!(matches!(
-            Sheet::new(&linkage, 1.0, 0.1),
+            Sheet::new(&linkage, &SheetOptions::plain(1.0, 0.1)),
             Err(PatternError::Overlap { .. })
         ));
     }
@@ -508,17 +725,25 @@ mod tests {
     fn the_ring_has_an_inner_contour_and_a_pinch_does_not_confuse_it() {
         let mut cells = Linkage::hexagon_cells(2);
         cells.retain(|&(i, j, c)| !Linkage::hexagon_cells(1).contains(&(i, j, c)));
-        let sheet = Sheet::new(&Linkage::patch(9.0, Handedness::Right, &cells), 1.0, 0.1).unwrap();
+        let sheet = Sheet::new(
+            &Linkage::patch(9.0, Handedness::Right, &cells),
+            &SheetOptions::plain(1.0, 0.1),
+        )
+        .unwrap();
         let outer: Vec<bool> = sheet.contours.iter().map(|c| c.outer).collect();
         assert_eq!(outer.iter().filter(|o| **o).count(), 1);
         assert_eq!(outer.len(), 2);
         // Two holes that touch at a vertex, one triangle each.
         let mut cells = Linkage::hexagon_cells(3);
         cells.retain(|c| *c != (0, 0, Colour::Up) && *c != (-1, -1, Colour::Down));
-        let sheet = Sheet::new(&Linkage::patch(9.0, Handedness::Right, &cells), 1.0, 0.1).unwrap();
+        let sheet = Sheet::new(
+            &Linkage::patch(9.0, Handedness::Right, &cells),
+            &SheetOptions::plain(1.0, 0.1),
+        )
+        .unwrap();
         assert_eq!(sheet.contours.len(), 3);
         for hole in sheet.contours.iter().filter(|c| !c.outer) {
-            assert_eq!(hole.points.len(), 3, "each hole is a loop of its own");
+            assert_eq!(hole.line.len(), 3, "each hole is a loop of its own");
         }
         let whole = cells.len() as f64 * 0.75f64.sqrt() / 2.0 * 81.0;
         assert!((sheet.figures().area_mm2 - whole).abs() < 1e-9);
@@ -527,8 +752,9 @@ mod tests {
     fn a_doubled_row_is_cut_like_the_rest_of_the_sheet() {
         for (around, across) in [(5, 2), (9, 6)] {
             let (linkage, flaps) = crate::linkage::cylinder_with_flaps(10.0, around, across);
-            let bare = Sheet::new(&linkage, 0.8, 0.2).unwrap();
-            let sheet = Sheet::with_flaps(&linkage, &flaps, 0.8, 0.2).unwrap();
+            let bare = Sheet::new(&linkage, &SheetOptions::plain(0.8, 0.2)).unwrap();
+            let sheet =
+                Sheet::with_flaps(&linkage, &flaps, &SheetOptions::plain(0.8, 0.2)).unwrap();
             let (old, new) = (bare.figures(), sheet.figures());
             let row = 2 * across as usize - 1;
             assert_eq!((old.flaps, new.flaps), (0, row));

@@ -4,10 +4,12 @@
 //! strikes. The slits of doubled rows have a group of their own, `flaps`; the contour goes around sheet and flaps, for a
 //! part is cut out along one closed line. Numbers that are not geometry ride along as `data-kagome-*` attributes of the root.
 
-use kurbo::{BezPath, PathEl, Point, Rect};
-use svg::node::element::{Group, Path};
+use kurbo::{Point, Rect};
+use svg::node::element::{Circle, Group, Path};
 
-use super::sheet::{Contour, Sheet, SheetMetadata, Slit, edges, signed_area};
+use super::mark::{Mark, MarkKind};
+use super::sheet::{Contour, Sheet, SheetMetadata, Slit, Tab, Tip};
+use crate::base::curve::{Curve, Piece, Vertex};
 use crate::base::units::{fixed, short};
 
 /// A tenth of a micrometre: a hundredth of what the verifier tolerates.
@@ -27,6 +29,18 @@ const CONTOUR: &str = "#ff0000";
 const SLITS: &str = "#0000ff";
 const FLAPS: &str = "#00a000";
 const GUIDE: &str = "#c0c0c0";
+const MARKS: &str = "#000000";
+
+const TIP_RADIUS: &str = "data-kagome-tip-radius-mm";
+const CORNER_RADIUS: &str = "data-kagome-corner-radius-mm";
+
+fn tip_words(tip: Tip) -> Option<(&'static str, f64)> {
+    match tip {
+        Tip::Plain => None,
+        Tip::Round { radius_mm } => Some(("round", radius_mm)),
+        Tip::Teardrop { radius_mm } => Some(("teardrop", radius_mm)),
+    }
+}
 
 /// The class of a flap triangle's outline.
 const FLAP: &str = "flap";
@@ -61,12 +75,9 @@ pub fn svg(sheet: &Sheet) -> String {
     let lines = |id: &str, colour: &str, flap: bool| {
         let chosen = sheet.slits.iter().filter(|slit| slit.flap == flap);
         chosen.fold(group(id, colour, "0.1"), |lines, slit| {
-            let mut path = BezPath::new();
-            path.move_to(slit.tail);
-            path.line_to(slit.tip);
             lines.add(
                 Path::new()
-                    .set("d", data(&path))
+                    .set("d", data(&Curve::line(slit.tail, slit.tip)))
                     .set("data-star", slit.star.to_string()),
             )
         })
@@ -74,7 +85,7 @@ pub fn svg(sheet: &Sheet) -> String {
     let mut contour = group("contour", CONTOUR, "0.1");
     for c in &sheet.contours {
         let class = if c.outer { "outer" } else { "inner" };
-        contour = contour.add(Path::new().set("class", class).set("d", closed(&c.points)));
+        contour = contour.add(Path::new().set("class", class).set("d", data(&c.line)));
     }
     let m = &sheet.metadata;
     let mut document = svg::Document::new()
@@ -91,13 +102,45 @@ pub fn svg(sheet: &Sheet) -> String {
         .set("data-kagome-format", FORMAT)
         .set("data-kagome-edge-mm", exact(m.edge_mm))
         .set("data-kagome-hinge-width-mm", exact(m.hinge_width_mm))
-        .set("data-kagome-kerf-mm", exact(m.kerf_mm))
-        .add(guide)
-        .add(lines("slits", SLITS, false));
+        .set("data-kagome-kerf-mm", exact(m.kerf_mm));
+    if let Some((shape, radius_mm)) = tip_words(m.tip) {
+        document = document
+            .set("data-kagome-tip", shape)
+            .set(TIP_RADIUS, exact(radius_mm));
+    }
+    if m.corner_radius_mm > 0.0 {
+        document = document.set(CORNER_RADIUS, exact(m.corner_radius_mm));
+    }
+    document = document.add(guide).add(lines("slits", SLITS, false));
     if !sheet.flaps.is_empty() {
         document = document.add(lines("flaps", FLAPS, true));
     }
-    let document = document.add(contour);
+    if !sheet.marks.is_empty() {
+        let mut marks = group("marks", MARKS, "0.1");
+        for mark in &sheet.marks {
+            let name = MarkKind::ALL.iter().find(|(k, _)| *k == mark.kind);
+            let strokes: Vec<String> = mark.strokes().iter().map(data).collect();
+            marks = marks.add(
+                Path::new()
+                    .set("class", name.map_or("", |n| n.1))
+                    .set("d", strokes.join(" ")),
+            );
+        }
+        document = document.add(marks);
+    }
+    document = document.add(contour);
+    if !sheet.tabs.is_empty() {
+        let mut tabs = group("tabs", GUIDE, "0.1");
+        for tab in &sheet.tabs {
+            tabs = tabs.add(
+                Circle::new()
+                    .set("cx", fixed(tab.at.x, DECIMALS))
+                    .set("cy", fixed(-tab.at.y, DECIMALS))
+                    .set("r", exact(0.5 * tab.width_mm)),
+            );
+        }
+        document = document.add(tabs);
+    }
     format!("{document}\n")
 }
 
@@ -107,32 +150,41 @@ fn exact(value: f64) -> String {
 }
 
 fn closed(points: &[Point]) -> String {
-    let mut path = BezPath::new();
-    for (i, p) in points.iter().enumerate() {
-        if i == 0 {
-            path.move_to(*p);
-        } else {
-            path.line_to(*p);
-        }
-    }
-    path.close_path();
-    data(&path)
+    data(&Curve::polyline(points.iter().copied(), true))
 }
 
-/// Path data with fixed decimals: kurbo's own writer has no precision, and the svg crate's rounds to f32.
-fn data(path: &BezPath) -> String {
+/// Arcs are written in parts of no more than this, radians: at a half turn the radius, rounded, would say nothing of
+/// where the centre is.
+const LARGEST_ARC: f64 = 1.8;
+
+/// Path data with fixed decimals: the svg crate's own builder rounds to f32. Arcs stay arcs.
+fn data(curve: &Curve) -> String {
     let at = |p: Point| format!("{},{}", fixed(p.x, DECIMALS), fixed(-p.y, DECIMALS));
-    let parts: Vec<String> = path
-        .elements()
-        .iter()
-        .map(|element| match *element {
-            PathEl::MoveTo(p) => format!("M{}", at(p)),
-            PathEl::LineTo(p) => format!("L{}", at(p)),
-            PathEl::QuadTo(a, p) => format!("Q{} {}", at(a), at(p)),
-            PathEl::CurveTo(a, b, p) => format!("C{} {} {}", at(a), at(b), at(p)),
-            PathEl::ClosePath => "Z".into(),
-        })
+    let mut parts: Vec<String> = curve
+        .start()
+        .map(|p| format!("M{}", at(p)))
+        .into_iter()
         .collect();
+    let n = curve.len();
+    for (i, piece) in curve.pieces().enumerate() {
+        match piece.arc() {
+            Some(arc) => {
+                let count = (arc.sweep.abs() / LARGEST_ARC).ceil().max(1.0);
+                let radius = fixed(arc.radius, DECIMALS);
+                // Y points down in the file, so that a turn to the left is one against the clock for the viewer.
+                let sweep = u8::from(arc.sweep < 0.0);
+                for k in 1..=count as usize {
+                    let to = piece.at(k as f64 / count);
+                    parts.push(format!("A{radius},{radius} 0 0 {sweep} {}", at(to)));
+                }
+            }
+            None if curve.closed && i + 1 == n => {}
+            None => parts.push(format!("L{}", at(piece.to))),
+        }
+    }
+    if curve.closed {
+        parts.push("Z".into());
+    }
     parts.join(" ")
 }
 
@@ -194,12 +246,35 @@ pub fn read_svg(text: &str) -> Result<Sheet, SvgError> {
         edge_mm: positive(root, "data-kagome-edge-mm")?,
         hinge_width_mm: positive(root, "data-kagome-hinge-width-mm")?,
         kerf_mm: positive(root, "data-kagome-kerf-mm")?,
+        tip: match root.attribute("data-kagome-tip") {
+            None => Tip::Plain,
+            Some("round") => Tip::Round {
+                radius_mm: positive(root, TIP_RADIUS)?,
+            },
+            Some("teardrop") => Tip::Teardrop {
+                radius_mm: positive(root, TIP_RADIUS)?,
+            },
+            Some(other) => {
+                return Err(SvgError::Attribute {
+                    attribute: "data-kagome-tip",
+                    problem: format!(
+                        "is {other:?}; it may be \"round\" or \"teardrop\", or be left out"
+                    ),
+                });
+            }
+        },
+        corner_radius_mm: match root.attribute(CORNER_RADIUS) {
+            None => 0.0,
+            Some(_) => positive(root, CORNER_RADIUS)?,
+        },
     };
     let mut sheet = Sheet {
         slits: Vec::new(),
         contours: Vec::new(),
         triangles: Vec::new(),
         flaps: Vec::new(),
+        marks: Vec::new(),
+        tabs: Vec::new(),
         metadata,
     };
     for node in root.descendants().filter(roxmltree::Node::is_element) {
@@ -216,9 +291,43 @@ pub fn read_svg(text: &str) -> Result<Sheet, SvgError> {
         let group = node.ancestors().skip(1).find_map(|a| a.attribute("id"));
         match (node.tag_name().name(), group) {
             ("svg" | "g", _) => {}
+            ("circle", Some("tabs")) => {
+                let number = |name: &str| {
+                    let value = node.attribute(name).and_then(|v| v.parse::<f64>().ok());
+                    value
+                        .filter(|v| v.abs() <= LARGEST_MM)
+                        .ok_or_else(|| wrong(format!("a tab without a plain {name}")))
+                };
+                sheet.tabs.push(Tab {
+                    at: Point::new(number("cx")?, -number("cy")?),
+                    width_mm: 2.0 * number("r")?,
+                });
+            }
+            ("path", Some("marks")) => {
+                let name = node.attribute("class").unwrap_or("");
+                let kind = MarkKind::ALL.iter().find(|(_, n)| *n == name);
+                let d = node.attribute("d").unwrap_or("");
+                sheet.marks.push(Mark {
+                    kind: kind.map_or(MarkKind::Name, |k| k.0),
+                    lines: curves(d).map_err(wrong)?,
+                    label: None,
+                });
+            }
             ("path", Some(group @ ("guide" | "slits" | "flaps" | "contour"))) => {
                 let d = node.attribute("d").unwrap_or("");
-                let (points, is_closed) = polyline(d).map_err(wrong)?;
+                let mut all = curves(d).map_err(wrong)?;
+                let line = match all.len() {
+                    1 => all.remove(0),
+                    _ => return Err(wrong("one path holds several lines; split it".into())),
+                };
+                let is_closed = line.closed;
+                let straight = line.pieces().all(|p| p.bulge == 0.0);
+                let points: Vec<Point> = line.vertices.iter().map(|v| v.at).collect();
+                if !straight && group != "contour" {
+                    return Err(wrong(format!(
+                        "a curve in the group `{group}`, which has straight lines only"
+                    )));
+                }
                 match (group, is_closed, points.len()) {
                     ("guide", true, 3) => {
                         let flap = node.attribute("class") == Some(FLAP);
@@ -238,9 +347,9 @@ pub fn read_svg(text: &str) -> Result<Sheet, SvgError> {
                             .ok_or_else(|| wrong("a slit without a number in data-star".into()))?,
                         flap: group == "flaps",
                     }),
-                    ("contour", true, 3..) => sheet.contours.push(Contour {
-                        outer: signed_area(&points) > 0.0,
-                        points,
+                    ("contour", true, 2..) => sheet.contours.push(Contour {
+                        outer: line.signed_area() > 0.0,
+                        line,
                     }),
                     _ => {
                         return Err(wrong(format!(
@@ -273,51 +382,123 @@ fn positive(root: roxmltree::Node<'_, '_>, attribute: &'static str) -> Result<f6
     }
 }
 
-/// The points of straight path data, in the sheet's frame, and whether it is closed.
-fn polyline(d: &str) -> Result<(Vec<Point>, bool), String> {
-    let path = BezPath::from_svg(d).map_err(|e| format!("path data {d:?}: {e}"))?;
-    let mut points = Vec::new();
-    let mut is_closed = false;
-    for (i, element) in path.elements().iter().enumerate() {
-        match *element {
-            PathEl::MoveTo(p) if i == 0 => points.push(p),
-            PathEl::LineTo(p) if !is_closed => points.push(p),
-            PathEl::ClosePath if !is_closed => is_closed = true,
-            PathEl::MoveTo(_) => return Err("one path holds several; split it".into()),
-            _ => return Err("a curve; a sheet has straight lines only".into()),
+/// The lines of path data in the sheet's frame.
+fn curves(d: &str) -> Result<Vec<Curve>, String> {
+    let mut all: Vec<Curve> = Vec::new();
+    let mut words = d
+        .split(|c: char| c.is_whitespace() || c == ',')
+        .filter(|w| !w.is_empty())
+        .flat_map(|w| {
+            // A letter stands before its first number without a space.
+            let split = usize::from(w.starts_with(|c: char| c.is_ascii_alphabetic()));
+            let (letter, number) = w.split_at(split);
+            [letter, number].into_iter().filter(|part| !part.is_empty())
+        })
+        .peekable();
+    let mut command = "";
+    let bad = |what: &str| format!("path data {d:?} {what}");
+    while let Some(word) = words.peek().copied() {
+        if word.starts_with(|c: char| c.is_ascii_alphabetic()) {
+            command = word;
+            words.next();
+        }
+        let mut number = || -> Result<f64, String> {
+            let value = words.next().and_then(|w| w.parse::<f64>().ok());
+            match value {
+                Some(v) if v.abs() <= LARGEST_MM => Ok(v),
+                Some(_) => Err(bad("has a coordinate that is on no sheet")),
+                None => Err(bad("has no number where one is due")),
+            }
+        };
+        let bulge_to = match command {
+            "M" => {
+                let at = Point::new(number()?, -number()?);
+                all.push(Curve::polyline([at], false));
+                // Further pairs after a move are lines.
+                command = "L";
+                continue;
+            }
+            "L" => None,
+            "A" => {
+                let (rx, ry) = (number()?, number()?);
+                let (_turn, large, sweep) = (number()?, number()?, number()?);
+                if (rx - ry).abs() > 1e-3 * rx {
+                    return Err(bad("has an arc of an ellipse"));
+                }
+                Some((rx, large != 0.0, sweep != 0.0))
+            }
+            "Z" => {
+                match all.last_mut() {
+                    Some(line) if !line.closed => close(line),
+                    _ => return Err(bad("closes what is not open")),
+                }
+                command = "";
+                continue;
+            }
+            _ => {
+                return Err(bad(
+                    "has a curve; a sheet has straight lines and arcs of circles only",
+                ));
+            }
+        };
+        let to = Point::new(number()?, -number()?);
+        let line = match all.last_mut() {
+            Some(line) if !line.closed => line,
+            _ => return Err(bad("draws on from nowhere")),
+        };
+        if let (Some(last), Some((radius, large, clockwise))) = (line.vertices.last_mut(), bulge_to)
+        {
+            let half = (0.5 * last.at.distance(to) / radius).min(1.0).asin();
+            let half = if large {
+                std::f64::consts::PI - half
+            } else {
+                half
+            };
+            last.bulge = (0.5 * half).tan() * if clockwise { -1.0 } else { 1.0 };
+        }
+        line.vertices.push(Vertex { at: to, bulge: 0.0 });
+    }
+    for line in &all {
+        if !line.is_finite() || line.is_empty() {
+            return Err(bad("has a line without length"));
+        }
+        if line
+            .pieces()
+            .any(|p: Piece| p.from.distance(p.to) < SHORTEST_MM)
+        {
+            return Err(bad("has two neighbouring points on one spot"));
         }
     }
-    if points
-        .iter()
-        .any(|p| !p.is_finite() || p.x.abs().max(p.y.abs()) > LARGEST_MM)
+    Ok(all)
+}
+
+/// Joins the end of a line to its beginning; an end that is there already is dropped.
+fn close(line: &mut Curve) {
+    let (first, last) = (
+        line.vertices.first().copied(),
+        line.vertices.last().copied(),
+    );
+    if let (Some(first), Some(last)) = (first, last)
+        && line.vertices.len() > 2
+        && first.at.distance(last.at) < 2e-4
     {
-        return Err(format!(
-            "path data {d:?} has a coordinate that is on no sheet"
-        ));
+        line.vertices.pop();
     }
-    if edges(&points).any(|(a, b)| a.distance(b) < SHORTEST_MM) {
-        return Err(format!(
-            "path data {d:?} has two neighbouring points on one spot"
-        ));
-    }
-    Ok((
-        points.into_iter().map(|p| Point::new(p.x, -p.y)).collect(),
-        is_closed,
-    ))
+    line.closed = true;
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::linkage::{Handedness, Linkage};
+    use crate::pattern::SheetOptions;
 
     fn sheet() -> Sheet {
         let mut cells = Linkage::hexagon_cells(3);
         cells.retain(|c| !Linkage::hexagon_cells(1).contains(c));
         Sheet::new(
             &Linkage::patch(10.0 / 3.0, Handedness::Left, &cells),
-            0.7,
-            0.15,
+            &SheetOptions::plain(0.7, 0.15),
         )
         .unwrap()
     }
@@ -335,7 +516,13 @@ mod tests {
         assert_eq!(one.contours.len(), 2);
         for (a, b) in one.contours.iter().zip(&two.contours) {
             assert_eq!(a.outer, b.outer);
-            assert!(a.points.iter().zip(&b.points).all(|(p, q)| close(*p, *q)));
+            assert!(
+                a.line
+                    .vertices
+                    .iter()
+                    .zip(&b.line.vertices)
+                    .all(|(p, q)| close(p.at, q.at))
+            );
         }
         assert_eq!(svg(&two), text);
         assert!(!text.contains("-0.0000"));
@@ -344,7 +531,7 @@ mod tests {
     #[test]
     fn flaps_have_a_group_of_their_own_and_are_read_back() {
         let (linkage, flaps) = crate::linkage::cylinder_with_flaps(8.0, 7, 4);
-        let one = Sheet::with_flaps(&linkage, &flaps, 0.7, 0.15).unwrap();
+        let one = Sheet::with_flaps(&linkage, &flaps, &SheetOptions::plain(0.7, 0.15)).unwrap();
         let text = svg(&one);
         let document = roxmltree::Document::parse(&text).unwrap();
         let root = document.root_element();

@@ -387,36 +387,6 @@ impl Random {
     }
 }
 
-/// Closed loops from nearest to nearest, each begun at the point nearest to where the head is, and closed.
-pub(super) fn loops(mut left: Vec<Vec<Point>>, mut at: Point) -> Vec<Vec<Point>> {
-    let mut done = Vec::with_capacity(left.len());
-    let nearest = |points: &[Point], at: Point| {
-        let mut best = (f64::INFINITY, 0);
-        for (k, p) in points.iter().enumerate() {
-            let d = p.distance_squared(at);
-            if d < best.0 {
-                best = (d, k);
-            }
-        }
-        best
-    };
-    while !left.is_empty() {
-        let mut best = (f64::INFINITY, 0, 0);
-        for (i, points) in left.iter().enumerate() {
-            let (d, k) = nearest(points, at);
-            if d < best.0 {
-                best = (d, i, k);
-            }
-        }
-        let mut points = left.remove(best.1);
-        points.rotate_left(best.2);
-        points.push(points[0]);
-        at = points[0];
-        done.push(points);
-    }
-    done
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

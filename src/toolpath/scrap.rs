@@ -1,0 +1,276 @@
+//! Scrap: everywhere outside the finished part, where a pierce may splash and a lead may run.
+//!
+//! A contour is entered from the side that falls away. The *lead-in* starts at the pierce, far enough out that its hole
+//! touches nothing that stays, and meets the outline at a slant in the direction of the cut; the *lead-out* leaves it
+//! the same way. Both start from the middle of a straight piece, so that no corner is marked.
+
+use kurbo::{Point, Vec2};
+use rstar::primitives::{GeomWithData, Line};
+use rstar::{AABB, RTree};
+
+use super::kerf::CHORD_ERROR_MM;
+use super::path::{CutOptions, ToolpathError};
+use crate::base::curve::{Curve, Piece, Vertex};
+use crate::pattern::{Contour, Sheet};
+
+/// Angle between a lead and the cut, radians.
+const SLANT: f64 = std::f64::consts::FRAC_PI_3;
+
+/// Kept between a pierce hole and the finished part, millimetres.
+const CLEAR_MM: f64 = 0.05;
+
+/// A point no farther from an edge lies on it, millimetres: drawings have four decimals.
+const ON_RIM_MM: f64 = 1e-3;
+
+/// Angles from the outward direction that are tried for a way in from the rim to a slit, radians.
+const WAYS: [f64; 7] = [0.0, 0.26, -0.26, 0.52, -0.52, 0.79, -0.79];
+
+/// The finished edges of a sheet by place.
+pub(super) struct Scrap {
+    edges: RTree<GeomWithData<Line<[f64; 2]>, u32>>,
+}
+
+impl Scrap {
+    pub fn new(sheet: &Sheet) -> Self {
+        let mut edges = Vec::new();
+        for (n, contour) in sheet.contours.iter().enumerate() {
+            let points = contour.line.flattened(CHORD_ERROR_MM);
+            for (i, a) in points.iter().enumerate() {
+                let b = points[(i + 1) % points.len()];
+                edges.push(GeomWithData::new(
+                    Line::new([a.x, a.y], [b.x, b.y]),
+                    n as u32,
+                ));
+            }
+        }
+        Self {
+            edges: RTree::bulk_load(edges),
+        }
+    }
+
+    /// Distance from a point to the nearest finished edge, up to `limit`.
+    fn clearance(&self, p: Point, limit: f64) -> f64 {
+        let near = AABB::from_corners([p.x - limit, p.y - limit], [p.x + limit, p.y + limit]);
+        let mut least = limit;
+        for edge in self.edges.locate_in_envelope_intersecting(near) {
+            let line = edge.geom();
+            let (a, b) = (
+                Point::new(line.from[0], line.from[1]),
+                Point::new(line.to[0], line.to[1]),
+            );
+            let d = b - a;
+            let t = ((p - a).dot(d) / d.hypot2().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            least = least.min(p.distance(a.lerp(b, t)));
+        }
+        least
+    }
+
+    /// Whether a point lies in the part: a ray from it to the right crosses an odd number of edges.
+    fn is_part(&self, p: Point) -> bool {
+        let ray = AABB::from_corners([p.x, p.y], [f64::MAX, p.y]);
+        let crossed = self.edges.locate_in_envelope_intersecting(ray).filter(|e| {
+            let (a, b) = (e.geom().from, e.geom().to);
+            (a[1] > p.y) != (b[1] > p.y)
+                && p.x < a[0] + (p.y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+        });
+        crossed.count() % 2 == 1
+    }
+
+    /// Whether the straight way from a pierce to a point of the outline stays in scrap, hole and beam and all.
+    fn is_free(&self, pierce: Point, to: Point, hole_mm: f64, kerf_mm: f64) -> bool {
+        let hole = 0.5 * hole_mm + CLEAR_MM;
+        if self.clearance(pierce, hole) < hole {
+            return false;
+        }
+        // Steps of half a kerf: an edge that came between two of them would be nearer than half a kerf to one.
+        let half = 0.5 * kerf_mm;
+        let steps = (pierce.distance(to) / half).ceil().clamp(1.0, 10_000.0);
+        (0..steps as usize).all(|k| {
+            let p = pierce.lerp(to, k as f64 / steps);
+            self.clearance(p, half) >= half - 2.0 * CHORD_ERROR_MM
+        })
+    }
+
+    /// The ways into and out of a closed outline, and the outline as an open line from where they meet it.
+    ///
+    /// With a pierce no wider than the kerf and no leads asked for, the line begins at the vertex nearest to `head`.
+    ///
+    /// # Errors
+    /// [`ToolpathError::NoRoomToPierce`] where the hole fits nowhere beside a wide pierce's outline.
+    pub fn enter(
+        &self,
+        contour: &Contour,
+        outline: &Curve,
+        options: &CutOptions,
+        kerf_mm: f64,
+        head: Point,
+    ) -> Result<Ways, ToolpathError> {
+        let nearest_vertex = || {
+            let vertices = outline.vertices.iter().enumerate();
+            let near = vertices.min_by(|a, b| {
+                let d = |v: &(usize, &Vertex)| v.1.at.distance_squared(head);
+                d(a).total_cmp(&d(b))
+            });
+            near.map_or(0, |(i, _)| i)
+        };
+        let wide = options.pierce_mm > kerf_mm;
+        if !wide && options.lead_in_mm <= 0.0 {
+            let line = outline.opened_at(nearest_vertex(), 0.0);
+            let along = line
+                .pieces()
+                .next_back()
+                .map_or(Vec2::ZERO, |p| p.direction(1.0));
+            let lead_out = self.leave(&line, along, options, kerf_mm);
+            return Ok(Ways {
+                lead_in: None,
+                line,
+                lead_out,
+            });
+        }
+        // Straight pieces, nearest middle first.
+        let mut pieces: Vec<(usize, Piece)> = outline.pieces().enumerate().collect();
+        pieces.retain(|(_, p)| p.bulge == 0.0 || p.arc().is_some_and(|a| a.radius > 2.0 * kerf_mm));
+        pieces.sort_by(|a, b| {
+            let d = |p: &Piece| p.at(0.5).distance_squared(head);
+            d(&a.1).total_cmp(&d(&b.1))
+        });
+        for length in lengths(options, kerf_mm) {
+            for (index, piece) in &pieces {
+                let (at, along) = (piece.at(0.5), piece.direction(0.5));
+                let pierce = at + lead(along, true) * length;
+                if self.is_free(pierce, at, options.pierce_mm, kerf_mm) {
+                    let line = outline.opened_at(*index, 0.5);
+                    let lead_out = self.leave(&line, along, options, kerf_mm);
+                    let lead_in = Some(Curve::line(pierce, at));
+                    return Ok(Ways {
+                        lead_in,
+                        line,
+                        lead_out,
+                    });
+                }
+            }
+        }
+        if wide {
+            return Err(no_room(contour.line.start().unwrap_or(head), options));
+        }
+        Ok(Ways {
+            lead_in: None,
+            line: outline.opened_at(nearest_vertex(), 0.0),
+            lead_out: None,
+        })
+    }
+
+    /// The way into the start of a stretch between two tabs.
+    ///
+    /// # Errors
+    /// [`ToolpathError::NoRoomToPierce`] if the hole is wide and fits nowhere.
+    pub fn way_in(
+        &self,
+        line: &Curve,
+        options: &CutOptions,
+        kerf_mm: f64,
+    ) -> Result<Option<Curve>, ToolpathError> {
+        let wide = options.pierce_mm > kerf_mm;
+        let Some(first) = line
+            .pieces()
+            .next()
+            .filter(|_| wide || options.lead_in_mm > 0.0)
+        else {
+            return Ok(None);
+        };
+        let found = lengths(options, kerf_mm).into_iter().find_map(|length| {
+            let pierce = first.from + lead(first.direction(0.0), true) * length;
+            let free = self.is_free(pierce, first.from, options.pierce_mm, kerf_mm);
+            free.then(|| Curve::line(pierce, first.from))
+        });
+        if found.is_none() && wide {
+            return Err(no_room(first.from, options));
+        }
+        Ok(found)
+    }
+
+    /// Overcut along the line's beginning, then away from the part.
+    fn leave(
+        &self,
+        line: &Curve,
+        along: Vec2,
+        options: &CutOptions,
+        kerf_mm: f64,
+    ) -> Option<Curve> {
+        let over = options.overcut_mm.min(0.5 * line.length());
+        let mut way = if over > 0.0 {
+            line.between(0.0, over)
+        } else {
+            Curve::default()
+        };
+        let (end, along) = match way.pieces().next_back() {
+            Some(last) => (last.to, last.direction(1.0)),
+            None => (line.end()?, along),
+        };
+        if options.lead_out_mm > 0.0 {
+            let out = end + lead(along, false) * options.lead_out_mm;
+            if self.is_free(out, end, kerf_mm, kerf_mm) {
+                way.join(&Curve::line(end, out));
+            }
+        }
+        (!way.is_empty()).then_some(way)
+    }
+
+    /// A way from scrap to the tail of a slit on the rim, if the pierce hole has room there.
+    pub fn way_to_rim(
+        &self,
+        tail: Point,
+        outwards: Vec2,
+        options: &CutOptions,
+        kerf_mm: f64,
+    ) -> Option<Curve> {
+        let least = 0.5 * options.pierce_mm + 2.0 * CLEAR_MM;
+        if self.clearance(tail, kerf_mm) > ON_RIM_MM {
+            return None;
+        }
+        for length in [options.lead_in_mm.max(least), 1.5 * least, least] {
+            for turn in WAYS {
+                let pierce = tail + Vec2::from_angle(turn + outwards.atan2()) * length;
+                // Near the tail the slit itself burns half a kerf to each side.
+                let end = tail.lerp(pierce, (kerf_mm / length).min(1.0));
+                if self.is_free(pierce, end, options.pierce_mm, kerf_mm) && !self.is_part(pierce) {
+                    return Some(Curve::line(pierce, tail));
+                }
+            }
+        }
+        None
+    }
+}
+
+/// A closed outline with its ways in and out.
+pub(super) struct Ways {
+    /// From the pierce to the line.
+    pub lead_in: Option<Curve>,
+    /// The outline as an open line.
+    pub line: Curve,
+    /// Overcut and way out.
+    pub lead_out: Option<Curve>,
+}
+
+fn no_room(at: Point, options: &CutOptions) -> ToolpathError {
+    ToolpathError::NoRoomToPierce {
+        x: at.x,
+        y: at.y,
+        pierce_mm: options.pierce_mm,
+        room_mm: 0.0,
+    }
+}
+
+/// Lengths of a lead-in that are tried: as asked, and shorter down to what the hole needs.
+fn lengths(options: &CutOptions, kerf_mm: f64) -> [f64; 3] {
+    let least = (0.5 * (options.pierce_mm - kerf_mm) + 2.0 * CLEAR_MM) / SLANT.sin();
+    let length = options.lead_in_mm.max(least);
+    [length, 0.5 * (length + least), least]
+}
+
+/// From the outline into the scrap on its right: back to where a lead-in comes from, or on to where a lead-out goes.
+fn lead(along: Vec2, back: bool) -> Vec2 {
+    let right = Vec2::new(along.y, -along.x);
+    let sign = if back { -1.0 } else { 1.0 };
+    right * SLANT.sin() + along * (sign * SLANT.cos())
+}
