@@ -103,14 +103,26 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
         ))
     })?;
     let machine = machine_for(args.machine.as_deref(), &text)?;
+    if let Some(m) = machine.as_ref().filter(|m| !m.controller.is_streamed()) {
+        return Err(Failure::Bad(format!(
+            "machine {} has {}, to which nothing is streamed: open {} there as a file. Nothing was sent",
+            m.name,
+            m.controller,
+            args.job.display()
+        )));
+    }
     let rules = JobRules {
         allow_constant_power: args.allow_constant_power,
-        ..JobRules::default()
+        line_limit: machine
+            .as_ref()
+            .map_or(JobRules::default().line_limit, Machine::line_limit),
     };
     if args.s_max.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
         return Err(Failure::Bad("--s-max must be a number above zero".into()));
     }
-    let s_max = args.s_max.or(machine.as_ref().map(|m| m.laser.s_max));
+    let s_max = args
+        .s_max
+        .or(machine.as_ref().and_then(|m| Some(m.laser()?.s_max)));
     let here = |error| Failure::Bad(format!("{}: {error}", args.job.display()));
     if let Some(machine) = &machine {
         // First the plain faults, in the sender's words.
@@ -151,7 +163,7 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
         s_max,
         buffer: machine
             .as_ref()
-            .map(|m| m.connection.receive_buffer_bytes as usize),
+            .and_then(|m| Some(m.connection.as_ref()?.receive_buffer_bytes as usize)),
         ..SendOptions::default()
     };
     // From the opening on: it resets the board, and an exit in between would leave it to itself.
@@ -162,7 +174,7 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
     };
     let baud = args
         .baud
-        .or(machine.map(|m| m.connection.baud))
+        .or(machine.and_then(|m| Some(m.connection?.baud)))
         .unwrap_or(STANDARD_BAUD);
     let mut port = SerialTransport::open(&args.port, baud).map_err(Failure::bad)?;
     let result = send(&mut port, &job, &options, terminal);

@@ -77,8 +77,10 @@ pub(crate) fn cut(
 
     progress.start("rehearsing on the simulated machine", None);
     let rules = JobRules {
-        allow_constant_power: machine.laser.power_mode == PowerMode::Constant,
-        ..JobRules::default()
+        allow_constant_power: machine
+            .laser()
+            .is_some_and(|l| l.power_mode == PowerMode::Constant),
+        line_limit: machine.line_limit(),
     };
     let rehearsal = rehearse(
         gcode.as_bytes(),

@@ -578,7 +578,9 @@ mod tests {
     use crate::pattern::SheetOptions;
 
     fn options(passes: u32) -> CutOptions {
-        let mut setting = crate::material::load("leather-1.6").unwrap().cut[0].clone();
+        let machine = crate::machine::load(crate::machine::DEFAULT).unwrap();
+        let material = crate::material::load("leather-1.6").unwrap();
+        let mut setting = material.cut_for(&machine).unwrap();
         setting.passes = passes;
         CutOptions::of(&setting)
     }
