@@ -61,8 +61,9 @@ pub(crate) fn cut(
     progress: &dyn Progress,
 ) -> Result<CutResult, MakeError> {
     progress.start("toolpath", None);
-    let toolpath =
-        plan(sheet, &CutOptions::of(setting), machine.park_mm()).map_err(MakeError::Toolpath)?;
+    let marks = material.mark_for(machine);
+    let options = CutOptions::of(setting, machine, marks.as_ref());
+    let toolpath = plan(sheet, &options, machine.park_mm()).map_err(MakeError::Toolpath)?;
     progress.check()?;
     let gcode = gcode::write(&toolpath, machine, material).map_err(MakeError::Gcode)?;
 

@@ -13,6 +13,7 @@ use super::request::{ConePlace, ConeWish, DartWish, FlapWish, Request, SheetWish
 use crate::base::document::{Complaint, Document, ranged};
 use crate::conformal::Sizing;
 use crate::linkage::Handedness;
+use crate::material::TipShape;
 use crate::mesh::{ImportOptions, PartChoice, Unit, Units};
 use crate::pattern::Tip;
 use crate::rationalize::Solver;
@@ -126,16 +127,6 @@ pub struct SheetChoice {
     pub tab_width_mm: f64,
 }
 
-/// A wide tip in a design file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum TipShape {
-    /// A round hole.
-    Round,
-    /// Round, with tangents to the slit.
-    Teardrop,
-}
-
 fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
@@ -151,7 +142,7 @@ impl SheetChoice {
             stock_mm: self.stock_mm,
             divide: !self.undivided,
             tip: Some(match self.tip {
-                None => Tip::Plain,
+                None | Some(TipShape::Plain) => Tip::Plain,
                 Some(TipShape::Round) => Tip::Round { radius_mm },
                 Some(TipShape::Teardrop) => Tip::Teardrop { radius_mm },
             }),
@@ -349,7 +340,8 @@ impl Design {
             ranged("sheet.stock_mm", size, 1.0, 1e5)?;
         }
         ranged("sheet.tip_radius_mm", self.sheet.tip_radius_mm, 0.0, 100.0)?;
-        if self.sheet.tip.is_some() != (self.sheet.tip_radius_mm > 0.0) {
+        let wide = self.sheet.tip.is_some_and(|tip| tip != TipShape::Plain);
+        if wide != (self.sheet.tip_radius_mm > 0.0) {
             return Err(Complaint::new(
                 "sheet.tip_radius_mm",
                 "goes with tip: give both or neither",

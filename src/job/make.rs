@@ -13,7 +13,7 @@ use serde_json::Value;
 use super::cut::{CutResult, cut};
 use super::design::{
     AlsoChoice, ConeChoice, DartChoice, Design, FORMAT, LinkageChoice, SheetChoice, SolveChoice,
-    SurfaceChoice, TipShape,
+    SurfaceChoice,
 };
 use super::load::{Also, Loaded, MOST_SURFACES, load};
 use super::maps::cone_opening_mm;
@@ -28,7 +28,7 @@ use crate::base::progress::Progress;
 use crate::conformal::{Cone, Dart, Flattened, Layout, Sizing};
 use crate::linkage::write_obj;
 use crate::machine::Machine;
-use crate::material::{CutSetting, Material};
+use crate::material::{CutSetting, Material, TipShape};
 use crate::mesh::{PartChoice, Surface, write};
 use crate::pattern::{self, SheetOptions, Tip};
 use crate::rationalize::{Quality, Solver, hinge_scales};
@@ -311,8 +311,12 @@ pub(crate) fn stock<'a>(
         options: SheetOptions {
             hinge_width_mm: request.hinge_width_mm.unwrap_or(material.hinge_width_mm),
             kerf_mm: request.kerf_mm.unwrap_or(setting.kerf_mm),
-            tip: request.sheet.tip.unwrap_or_default(),
-            corner_radius_mm: request.sheet.corner_radius_mm.unwrap_or(0.0),
+            tip: request.sheet.tip.unwrap_or_else(|| tip_of(material)),
+            corner_radius_mm: request
+                .sheet
+                .corner_radius_mm
+                .or(material.corner_radius_mm)
+                .unwrap_or(0.0),
             alignment_hole_mm: request.sheet.alignment_hole_mm,
         },
         machine,
@@ -324,6 +328,18 @@ pub(crate) fn stock<'a>(
     check_sizing(request.sizing)?;
     check_ranges(request.accept_distance, &stock)?;
     Ok(stock)
+}
+
+/// The shape of slits' tips that a material's profile asks for.
+fn tip_of(material: &Material) -> Tip {
+    let Some(tip) = material.tip else {
+        return Tip::Plain;
+    };
+    match (tip.shape, tip.radius_mm) {
+        (TipShape::Round, Some(radius_mm)) => Tip::Round { radius_mm },
+        (TipShape::Teardrop, Some(radius_mm)) => Tip::Teardrop { radius_mm },
+        _ => Tip::Plain,
+    }
 }
 
 /// What was decided about the shape of a sheet.

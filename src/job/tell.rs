@@ -260,8 +260,14 @@ pub(crate) fn summary(
 }
 
 /// What the box around a sheet costs, if the material's profile has a price.
-fn cost(_material: &Material, _box_mm2: f64) -> String {
-    String::new()
+fn cost(material: &Material, box_mm2: f64) -> String {
+    let (Some(price), Some(currency)) = (material.price_per_m2, &material.currency) else {
+        return String::new();
+    };
+    format!(
+        ", {} {currency} with its offcut",
+        short(price * box_mm2 * 1e-6, 2)
+    )
 }
 
 /// Counts and lengths of several sheets together; width and height are the largest.
