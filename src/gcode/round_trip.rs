@@ -179,6 +179,11 @@ proptest! {
         if !sheet.slits.is_empty() {
             prop_assert!((ligaments.narrowest_mm - 0.8).abs() < 0.003, "{}", ligaments.narrowest_mm);
         }
+        // A pierce hole said to be wider reaches a ligament, or the part beside a lead.
+        if pierce > 0.2 {
+            let wider = text.replace("; pierce 0.9\n", "; pierce 8\n");
+            prop_assert!(findings(&wider, &machine, &sheet, passes).iter().any(|f| f.rule == Rule::Pierce));
+        }
         // Without its header's word nothing is burnt beside the drawing.
         let bare: String = text.lines().filter(|l| *l != "; leads").map(|l| format!("{l}\n")).collect();
         let leads = text.contains("; leads\n");

@@ -7,7 +7,7 @@ use kurbo::Point;
 use super::compare::{Kind, NO_GAP_MM, Wanted, compare};
 use super::coverage::{Index, Segment};
 use super::interpret::{Program, read};
-use super::ligament::{Ligaments, Outside, check_order, distance, measure};
+use super::ligament::{Ligaments, Outside, check_order, check_pierces, distance, measure};
 use super::write::{Declared, passes_of};
 use crate::base::units::short;
 use crate::machine::{Machine, PowerMode};
@@ -171,8 +171,16 @@ pub fn verify(
         let scrap = |piece: &Segment| declared.leads && outside.is_scrap(piece);
         compare(&burnt, &wanted, n, NO_GAP_MM, &scrap, &mut findings);
         check_order(sheet, &wanted, &burnt, &mut findings);
+        let engraved = if declared.marks {
+            engraved(&program, &wanted, &mut findings)
+        } else {
+            vec![false; burnt.len()]
+        };
+        if declared.pierce_mm > sheet.metadata.kerf_mm {
+            let starts = pierces(&program, &engraved);
+            check_pierces(sheet, &outside, &starts, declared.pierce_mm, &mut findings);
+        }
         let cuts = if declared.marks {
-            let engraved = engraved(&program, &wanted, &mut findings);
             burnt
                 .into_iter()
                 .zip(engraved)
@@ -306,6 +314,21 @@ fn check_moves(program: &Program, machine: &Machine, findings: &mut Vec<Finding>
             );
         }
     }
+}
+
+/// Where the beam goes on to cut; `engraved` says of each burning move whether it marks.
+fn pierces(program: &Program, engraved: &[bool]) -> Vec<(Option<usize>, Point)> {
+    let mut starts = Vec::new();
+    let mut burning = false;
+    let mut marks = engraved.iter();
+    for m in &program.moves {
+        let mark = m.burns() && marks.next().copied().unwrap_or(false);
+        if m.burns() && !burning && !mark {
+            starts.extend(m.from.map(|from| (Some(m.line), from)));
+        }
+        burning = m.burns();
+    }
+    starts
 }
 
 /// For each burning move whether it engraves a mark. A mark that gets as much energy a millimetre as the gentlest cut is a

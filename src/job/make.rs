@@ -30,7 +30,7 @@ use crate::linkage::write_obj;
 use crate::machine::Machine;
 use crate::material::{CutSetting, Material, TipShape};
 use crate::mesh::{PartChoice, Surface, write};
-use crate::pattern::{self, SheetOptions, Tip};
+use crate::pattern::{self, HingeRisk, SheetOptions, Tip, hinge_risks};
 use crate::rationalize::{Quality, Solver, hinge_scales};
 use crate::toolpath::{Role, Toolpath};
 
@@ -157,8 +157,39 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     if !shape.verdict.pass && request.solver == Solver::Exact {
         remedy::explain(request, &mut shape, &stock, &targets, progress)?;
     }
-    let warnings = tell::warnings(&loaded, &material, &shape, stock.sigma);
+    let mut warnings = tell::warnings(&loaded, &material, &shape, stock.sigma);
 
+    let edge_mm = shape.flat.edge_mm;
+    let measured: Vec<(Vec<f64>, Vec<f64>)> = shape
+        .fits
+        .iter()
+        .zip(&targets.0)
+        .map(|(fit, target)| {
+            let distance = |p: &Point3<f64>| target.closest.query(*p).distance / edge_mm;
+            (
+                fit.positions.iter().map(distance).collect(),
+                hinge_scales(&shape.linkage, &fit.positions),
+            )
+        })
+        .collect();
+    let ligament = stock.options.ligament(edge_mm, material.thickness_mm);
+    let risks: Vec<Vec<HingeRisk>> = shape
+        .fits
+        .iter()
+        .zip(&measured)
+        .map(|(fit, (_, openings))| {
+            hinge_risks(
+                &shape.linkage,
+                &fit.positions,
+                openings,
+                &ligament,
+                stock.sigma,
+            )
+        })
+        .collect();
+    for (fit, risks) in shape.fits.iter().zip(&risks) {
+        warnings.extend(tell::risk(fit, risks));
+    }
     if shape.sheets.len() > MOST_SHEETS {
         return Err(MakeError::TooManySheets {
             sheets: shape.sheets.len(),
@@ -202,7 +233,6 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
             toolpath: drawn(&job.toolpath),
         })
         .collect();
-    let edge_mm = shape.flat.edge_mm;
     // Of several surfaces each as it was slit, else the one that was mapped, with its own λ.
     let slit: Vec<&Surface> = match &shape.ground.shapes[..] {
         [] => vec![&shape.ground.surface],
@@ -215,18 +245,6 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
             .map(|s| Cow::Owned(on_shape(&shape.flat.layout, s)))
             .collect(),
     };
-    let measured: Vec<(Vec<f64>, Vec<f64>)> = shape
-        .fits
-        .iter()
-        .zip(&targets.0)
-        .map(|(fit, target)| {
-            let distance = |p: &Point3<f64>| target.closest.query(*p).distance / edge_mm;
-            (
-                fit.positions.iter().map(distance).collect(),
-                hinge_scales(&shape.linkage, &fit.positions),
-            )
-        })
-        .collect();
     let poses: Vec<Pose<'_>> = (0..shape.fits.len())
         .map(|n| Pose {
             name: &targets.0[n].name,
@@ -235,6 +253,7 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
             positions: &shape.fits[n].positions,
             distances_in_l: &measured[n].0,
             openings: &measured[n].1,
+            risks: &risks[n],
         })
         .collect();
     let page = Page {

@@ -7,6 +7,7 @@
 
 mod contour;
 mod font;
+mod ligament;
 mod mark;
 mod nest;
 mod place;
@@ -16,6 +17,7 @@ mod svg;
 mod tabs;
 
 pub use font::{can_write, width_mm};
+pub use ligament::{HingeRisk, Ligament, PIVOT_IN_NECKS, hinge_risks};
 pub use mark::{Label, Mark, MarkKind};
 pub use nest::{Nested, StockArea, fits_stock, nest};
 pub use place::{Motion, placed, placed_on};

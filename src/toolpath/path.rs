@@ -523,7 +523,7 @@ impl Planner<'_> {
                 self.lead(ways.lead_in, ways.lead_out);
             }
             for stretch in stretches {
-                let way_in = scrap.way_in(&stretch, self.options, kerf_mm)?;
+                let (way_in, stretch) = scrap.way_in(stretch, self.options, kerf_mm)?;
                 self.push(role, stretch, self.options.passes);
                 self.lead(way_in, None);
             }
