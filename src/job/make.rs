@@ -26,7 +26,7 @@ use super::{MakeError, remedy, tell};
 use crate::base::atomic;
 use crate::base::progress::Progress;
 use crate::conformal::{Cone, Dart, Flattened, Layout, Sizing};
-use crate::linkage::write_obj;
+use crate::linkage::{write_glb, write_obj};
 use crate::machine::Machine;
 use crate::material::{CutSetting, Material};
 use crate::mesh::{PartChoice, Surface, write};
@@ -35,11 +35,13 @@ use crate::rationalize::{Quality, Solver, hinge_scales};
 use crate::toolpath::{Role, Toolpath};
 
 /// Names of all files that `make` may write, for replacing an earlier result safely.
-pub const FILES: [&str; 23] = [
+pub const FILES: [&str; 25] = [
     "design.toml",
     "layout.obj",
     "linkage.obj",
+    "linkage.glb",
     "pattern.svg",
+    "pattern.dxf",
     "job.nc",
     "report.json",
     "report.html",
@@ -146,11 +148,9 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         job.as_ref(),
         stock.sigma,
     );
-    let drawing = shape
-        .sheet
-        .as_ref()
-        .filter(|_| job.is_some())
-        .map(pattern::svg);
+    let cut_sheet = || shape.sheet.as_ref().filter(|_| job.is_some());
+    let drawing = cut_sheet().map(pattern::svg);
+    let exchange = cut_sheet().map(pattern::dxf);
     let strokes = job.as_ref().map(|job| drawn(&job.toolpath));
     let edge_mm = shape.flat.edge_mm;
     // Of several surfaces each as it was slit, else the one that was mapped, with its own λ.
@@ -224,8 +224,12 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     ];
     if let (Some(CutResult { gcode, .. }), Some(drawing)) = (job, drawing) {
         files.push(("pattern.svg", drawing.into_bytes()));
+        files.extend(exchange.map(|text| ("pattern.dxf", text.into_bytes())));
         files.push(("job.nc", gcode.into_bytes()));
     }
+    // Only a linkage too large for the format has none.
+    let opened = write_glb(&shape.linkage, &[&shape.first().positions]);
+    files.extend(opened.map(|bytes| ("linkage.glb", bytes)));
     let further = shape.fits.iter().zip(&targets.0).skip(1);
     for ((fit, target), names) in further.zip(FILES[OWN_FILES..].chunks(2)) {
         files.push((names[0], linkage(fit)));

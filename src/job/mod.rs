@@ -26,6 +26,7 @@ mod verdict;
 
 use std::path::PathBuf;
 
+pub use cut::{CutDrawing, cut_drawing};
 pub use design::{
     AlsoChoice, ConeChoice, CutChoice, DartChoice, Design, LinkageChoice, SheetChoice, SolveChoice,
     SurfaceChoice,
@@ -206,6 +207,9 @@ pub enum MakeError {
     /// No solution at all.
     #[error(transparent)]
     Rationalize(crate::rationalize::RationalizeError),
+    /// The drawing is no sheet.
+    #[error(transparent)]
+    Drawing(crate::pattern::SvgError),
     /// No sheet, or none that fits the bed.
     #[error(transparent)]
     Pattern(crate::pattern::PatternError),

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use nalgebra::{Point2, Point3};
 
 use super::MakeError;
+use super::make::title;
 use super::maps::{Ground, Map};
 use super::request::{ConeWish, FlapWish, Request};
 use super::targets::{Shaped, Targets};
@@ -211,7 +212,12 @@ fn solve(
     if built.overlaps.is_empty() {
         let draw = |flaps: &Flaps| {
             let options = SheetOptions::plain(stock.hinge_width_mm, stock.kerf_mm);
-            let drawn = Sheet::with_flaps(&built.linkage, flaps, &options)?;
+            let mut drawn = Sheet::with_flaps(&built.linkage, flaps, &options)?;
+            let told = pattern::MarkOptions {
+                name: &title(&request.source),
+                back: request.mirror,
+            };
+            drawn.marks = pattern::marks(&built.linkage, &drawn, &told);
             pattern::placed(&drawn, stock.machine, request.mirror)
         };
         let mut drawn = draw(&flaps);
