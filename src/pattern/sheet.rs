@@ -283,6 +283,46 @@ pub enum PatternError {
         /// Where.
         y: f64,
     },
+    /// A ligament of an edited drawing is too narrow.
+    #[error(
+        "near ({x:.3}, {y:.3}) mm only {width_mm:.3} mm of material are left between a slit and {other}, and the drawing asks for hinges of {hinge_width_mm} mm: move or shorten the slit"
+    )]
+    Thin {
+        /// Where.
+        x: f64,
+        /// Where.
+        y: f64,
+        /// What is left; 0 where cuts cross.
+        width_mm: f64,
+        /// What is asked for.
+        hinge_width_mm: f64,
+        /// `another slit` or `the contour`.
+        other: &'static str,
+    },
+    /// A drawing that is not on the bed.
+    #[error(
+        "the drawing lies at ({x0:.1}, {y0:.1}) to ({x1:.1}, {y1:.1}) mm with its cut, and machine `{machine}` reaches from ({from_x:.1}, {from_y:.1}) to ({to_x:.1}, {to_y:.1}) mm: move it in the drawing program, or let it be moved into the corner (--place)"
+    )]
+    OffBed {
+        /// Left of the drawing.
+        x0: f64,
+        /// Its lower edge.
+        y0: f64,
+        /// Its right.
+        x1: f64,
+        /// Its upper edge.
+        y1: f64,
+        /// The machine.
+        machine: String,
+        /// Left of the bed.
+        from_x: f64,
+        /// Its lower edge.
+        from_y: f64,
+        /// Its right.
+        to_x: f64,
+        /// Its upper edge.
+        to_y: f64,
+    },
     /// Larger than the bed.
     #[error(
         "the sheet is {width_mm:.1} x {height_mm:.1} mm with its cut, and there is room for {bed_width_mm:.1} x {bed_height_mm:.1} mm inside the margins, whichever way it is turned. It fits with triangles of edge {fitting_edge_mm:.3} mm or less in the same number (--scale {fitting_scale:.4} of this size), or on a larger machine"
@@ -572,7 +612,7 @@ fn slits(
 }
 
 /// For corner `k` of triangle `t` at `3 t + k`: a number shared by all corners of one fan around one point.
-fn flat_vertices(
+pub(super) fn flat_vertices(
     triangles: &Per<TriangleId, Triangle>,
     neighbours: &Per<TriangleId, [Option<(TriangleId, usize)>; 3]>,
 ) -> Vec<u32> {
