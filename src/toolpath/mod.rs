@@ -9,4 +9,5 @@ mod order;
 mod path;
 
 pub use kerf::{CHORD_ERROR_MM, outline};
+pub use order::{Heat, LOOKBACK, Spacing, order_strokes, spacing};
 pub use path::{Cut, Figures, Role, Toolpath, ToolpathError, plan};
