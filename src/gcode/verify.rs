@@ -4,7 +4,7 @@ use std::fmt;
 
 use kurbo::Point;
 
-use super::compare::{Kind, NO_GAP_MM, Wanted, compare};
+use super::compare::{Kind, NO_GAP_MM, Slack, Wanted, compare};
 use super::coverage::{Index, Segment};
 use super::interpret::{Program, read};
 use super::ligament::{Ligaments, Outside, check_order, check_pierces, distance, measure};
@@ -169,7 +169,11 @@ pub fn verify(
             .collect();
         let outside = Outside::new(sheet, &wanted);
         let scrap = |piece: &Segment| declared.leads && outside.is_scrap(piece);
-        compare(&burnt, &wanted, n, NO_GAP_MM, &scrap, &mut findings);
+        let exact = Slack {
+            sideways_mm: TOLERANCE_MM,
+            gap_mm: NO_GAP_MM,
+        };
+        compare(&burnt, &wanted, n, exact, &scrap, &mut findings);
         check_order(sheet, &wanted, &burnt, &mut findings);
         let engraved = if declared.marks {
             engraved(&program, &wanted, &mut findings)
@@ -378,8 +382,7 @@ fn engraved(program: &Program, wanted: &Wanted, findings: &mut Vec<Finding>) -> 
 /// often as wanted but for gaps up to `gap_mm`, and nothing else. Findings carry no line.
 ///
 /// # Tolerance
-/// Sideways [`TOLERANCE_MM`]. `gap_mm`, measured along the cut and round its corners, is for what a controller does at the ends of a stroke, where it switches the
-/// beam off a little before it stands.
+/// What `slack` says: gaps are measured along the cut and round its corners.
 ///
 /// # Errors
 /// [`ToolpathError`] if the sheet itself cannot be cut with its kerf.
@@ -388,7 +391,7 @@ pub fn compare_burnt(
     burnt: &[[Point; 2]],
     passes: u32,
     declared: &Declared,
-    gap_mm: f64,
+    slack: Slack,
 ) -> Result<Vec<Finding>, ToolpathError> {
     let burnt: Vec<(Option<usize>, Segment)> = burnt
         .iter()
@@ -398,7 +401,7 @@ pub fn compare_burnt(
     let wanted = Wanted::new(sheet, declared)?;
     let outside = Outside::new(sheet, &wanted);
     let scrap = |piece: &Segment| declared.leads && outside.is_scrap(piece);
-    compare(&burnt, &wanted, passes, gap_mm, &scrap, &mut findings);
+    compare(&burnt, &wanted, passes, slack, &scrap, &mut findings);
     Ok(findings)
 }
 

@@ -11,7 +11,7 @@ use super::MakeError;
 use crate::base::progress::Progress;
 use crate::base::units::short;
 use crate::control::JobRules;
-use crate::gcode::{self, compare_burnt};
+use crate::gcode::{self, Slack, compare_burnt};
 use crate::machine::{Machine, PowerMode};
 use crate::material::{CutSetting, Material};
 use crate::pattern::{self, Sheet};
@@ -51,6 +51,15 @@ fn stop_gap_mm(machine: &Machine) -> f64 {
         .x
         .hypot(machine.motion.acceleration_mm_per_s2.y);
     0.5 * fastest * DARK_S * DARK_S + gcode::TOLERANCE_MM
+}
+
+/// A real machine stands on steps of its motors: half of one in each axis comes on top of the verifier's tolerance.
+fn slack(machine: &Machine) -> Slack {
+    let [x, y, _] = Settings::of_machine(machine).steps_per_mm;
+    Slack {
+        sideways_mm: gcode::TOLERANCE_MM + (0.5 / x).hypot(0.5 / y),
+        gap_mm: stop_gap_mm(machine),
+    }
 }
 
 /// Plans, writes, verifies and rehearses the cut of `sheet`, which lies in its place on the bed.
@@ -102,7 +111,7 @@ pub(crate) fn cut(
         &burnt,
         setting.passes,
         &gcode::Declared::of(&gcode),
-        stop_gap_mm(machine),
+        slack(machine),
     )
     .map_err(MakeError::Toolpath)?;
     objections.extend(listed(
