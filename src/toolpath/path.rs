@@ -5,7 +5,7 @@ use kurbo::Point;
 use super::scrap::Scrap;
 use super::{kerf, order, star};
 use crate::base::curve::{Curve, Piece};
-use crate::material::CutSetting;
+use crate::material::{CutSetting, PassOrder};
 use crate::pattern::{Sheet, Star};
 
 /// What a cut is for; also the order in which cuts are made.
@@ -257,16 +257,6 @@ impl Toolpath {
     }
 }
 
-/// In which order several passes are made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PassOrder {
-    /// Each cut to its depth, then the next: no pass has to find its groove again.
-    #[default]
-    Cut,
-    /// All slits once, then all of them again: cooler, and slower.
-    Sheet,
-}
-
 /// Where a torch must slow down, because it leans in corners.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CornerSlowdown {
@@ -310,11 +300,11 @@ impl CutOptions {
             feed_mm_per_min: setting.speed_mm_per_min,
             power_percent: setting.power_percent,
             passes: setting.passes.max(1),
-            pass_order: PassOrder::Cut,
-            pierce_mm: setting.kerf_mm,
-            lead_in_mm: 0.0,
-            lead_out_mm: 0.0,
-            overcut_mm: 0.0,
+            pass_order: setting.pass_order,
+            pierce_mm: setting.pierce_diameter_mm,
+            lead_in_mm: setting.lead_in_mm,
+            lead_out_mm: setting.lead_out_mm,
+            overcut_mm: setting.overcut_mm,
             corner: None,
             engrave: None,
         }

@@ -1,0 +1,1 @@
+//! What LinuxCNC, QtPlasmaC and other plasma tables make of a text.
