@@ -15,9 +15,10 @@ pub mod pose;
 mod profiles;
 pub mod samples;
 pub mod send;
+pub mod sheet_args;
 pub mod sim;
 pub mod states;
-pub mod surface_args;
+mod surface_args;
 mod terminal;
 pub mod verify;
 

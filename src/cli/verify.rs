@@ -47,8 +47,12 @@ pub fn run(args: &VerifyArgs, global: &Global, terminal: &Terminal) -> Result<()
         None => machine::load(machine::DEFAULT).map_err(Failure::bad)?,
     };
     let sheet_path = args.sheet.clone().or_else(|| {
-        let beside = args.job.with_file_name("pattern.svg");
-        beside.is_file().then_some(beside)
+        // job.nc goes with pattern.svg, job-2.nc with pattern-2.svg.
+        let name = args.job.file_stem()?.to_string_lossy().into_owned();
+        let number = name.strip_prefix("job").unwrap_or("");
+        let own = args.job.with_file_name(format!("pattern{number}.svg"));
+        let first = args.job.with_file_name("pattern.svg");
+        [own, first].into_iter().find(|path| path.is_file())
     });
     let sheet = match &sheet_path {
         None => None,

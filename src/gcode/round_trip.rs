@@ -69,7 +69,12 @@ fn job(linkage: &Linkage, passes: u32, mirror: bool) -> (Sheet, String, Machine)
     let (sheet, _) = placed(&sheet, &machine, mirror).unwrap();
     // What the verifier gets is the drawing, not our memory of it.
     let sheet = read_svg(&svg(&sheet)).unwrap();
-    let toolpath = plan(&sheet, &CutOptions::of(&setting), [0.0, 0.0]).unwrap();
+    let toolpath = plan(
+        &sheet,
+        &CutOptions::of(&setting, &machine, None),
+        [0.0, 0.0],
+    )
+    .unwrap();
     let text = write(&toolpath, &machine, &material).unwrap();
     (sheet, text, machine)
 }
@@ -133,7 +138,7 @@ fn wide_cut(pierce_mm: f64, passes: u32, pass_order: PassOrder) -> CutOptions {
             percent: 60.0,
         }),
         engrave: Some((3000.0, 5.0)),
-        ..CutOptions::of(&material.cut_for(&machine).unwrap())
+        ..CutOptions::of(&material.cut_for(&machine).unwrap(), &machine, None)
     }
 }
 
@@ -157,17 +162,8 @@ fn torch_job(
     }
     let (sheet, _) = placed(&sheet, &machine, false).unwrap();
     let sheet = read_svg(&svg(&sheet)).unwrap();
-    let options = CutOptions {
-        engrave: material
-            .mark_for(&machine)
-            .map(|m| (m.speed_mm_per_min, m.power_percent)),
-        corner: machine.plasma().unwrap().corner.map(|c| CornerSlowdown {
-            angle: c.angle_deg.to_radians(),
-            distance_mm: c.distance_mm,
-            percent: c.percent,
-        }),
-        ..CutOptions::of(&setting)
-    };
+    let marks = material.mark_for(&machine);
+    let options = CutOptions::of(&setting, &machine, marks.as_ref());
     let toolpath = plan(&sheet, &options, machine.park_mm()).unwrap();
     let text = write(&toolpath, &machine, &material).unwrap();
     (sheet, text, machine)

@@ -8,6 +8,7 @@
 mod contour;
 mod font;
 mod mark;
+mod nest;
 mod place;
 mod sheet;
 mod star;
@@ -16,7 +17,8 @@ mod tabs;
 
 pub use font::{can_write, width_mm};
 pub use mark::{Label, Mark, MarkKind};
-pub use place::{Motion, placed};
+pub use nest::{Nested, StockArea, fits_stock, nest};
+pub use place::{Motion, placed, placed_on};
 pub use sheet::{
     Contour, Figures, MAX_NECK, PatternError, Sheet, SheetMetadata, SheetOptions, Slit, Tab, Tip,
 };

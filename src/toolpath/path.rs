@@ -5,7 +5,8 @@ use kurbo::Point;
 use super::scrap::Scrap;
 use super::{kerf, order, star};
 use crate::base::curve::{Curve, Piece};
-use crate::material::{CutSetting, PassOrder};
+use crate::machine::Machine;
+use crate::material::{CutSetting, MarkSetting, PassOrder};
 use crate::pattern::{Sheet, Star};
 
 /// What a cut is for; also the order in which cuts are made.
@@ -294,8 +295,9 @@ pub struct CutOptions {
 }
 
 impl CutOptions {
-    /// As a material's profile says.
-    pub fn of(setting: &CutSetting) -> Self {
+    /// As the profiles say; marks are engraved if there are settings for them.
+    pub fn of(setting: &CutSetting, machine: &Machine, marks: Option<&MarkSetting>) -> Self {
+        let corner = machine.plasma().and_then(|torch| torch.corner);
         Self {
             feed_mm_per_min: setting.speed_mm_per_min,
             power_percent: setting.power_percent,
@@ -305,8 +307,12 @@ impl CutOptions {
             lead_in_mm: setting.lead_in_mm,
             lead_out_mm: setting.lead_out_mm,
             overcut_mm: setting.overcut_mm,
-            corner: None,
-            engrave: None,
+            corner: corner.map(|c| CornerSlowdown {
+                angle: c.angle_deg.to_radians(),
+                distance_mm: c.distance_mm,
+                percent: c.percent,
+            }),
+            engrave: marks.map(|m| (m.speed_mm_per_min, m.power_percent)),
         }
     }
 }
@@ -570,9 +576,11 @@ mod tests {
     fn options(passes: u32) -> CutOptions {
         let machine = crate::machine::load(crate::machine::DEFAULT).unwrap();
         let material = crate::material::load("leather-1.6").unwrap();
-        let mut setting = material.cut_for(&machine).unwrap();
-        setting.passes = passes;
-        CutOptions::of(&setting)
+        let setting = material.cut_for(&machine).unwrap();
+        CutOptions {
+            passes,
+            ..CutOptions::of(&setting, &machine, None)
+        }
     }
 
     fn ring() -> Sheet {

@@ -15,9 +15,9 @@ const JOIN_MM: f64 = STRAY_MM - CHORD_MM;
 /// Micrometres in a millimetre: GRBL prints and keeps no more, and the verifier tolerates ten.
 const PER_MM: f64 = 1000.0;
 
-/// Difference of the two radii of an arc, micrometres: far within what GRBL takes (5, or a thousandth of the radius) and
-/// LinuxCNC 2.9 (25, likewise), and no more than the rounding of the ends is worth.
-const RADII_UM: f64 = 1.0;
+/// Difference of the two radii of an arc, micrometres. Rounding the centre makes it up to 1.5; GRBL takes 5, or a
+/// thousandth of the radius, and LinuxCNC 2.9 takes 25, likewise.
+const RADII_UM: f64 = 2.0;
 
 /// Larger radii are straight enough for chords, millimetres. GRBL computes with 24 bits: at a metre they are worth 0.06
 /// micrometres, and at a hundred metres six.
@@ -176,23 +176,17 @@ impl Maker {
         }
         let centre = spot(arc.centre)?;
         let about = [centre[0] - from[0], centre[1] - from[1]];
-        // The centre too must be a whole number: of those around it, the one whose two radii agree best.
-        let radii = |c: Spot| {
-            let length = |x: i64, y: i64| (x as f64).hypot(y as f64);
-            (length(c[0], c[1]), length(chord[0] - c[0], chord[1] - c[1]))
-        };
-        let gap = |c: Spot| (radii(c).0 - radii(c).1).abs();
-        let around = (0..9).map(|k| [about[0] + k % 3 - 1, about[1] + k / 3 - 1]);
-        let best = around.min_by(|a, b| {
-            let far = |c: &Spot| (c[0] - about[0]).abs() + (c[1] - about[1]).abs();
-            gap(*a).total_cmp(&gap(*b)).then(far(a).cmp(&far(b)))
-        })?;
-        if gap(best) > RADII_UM {
+        let length = |x: i64, y: i64| (x as f64).hypot(y as f64);
+        let radii = (
+            length(about[0], about[1]),
+            length(chord[0] - about[0], chord[1] - about[1]),
+        );
+        if (radii.0 - radii.1).abs() > RADII_UM {
             return None;
         }
         let clockwise = piece.bulge < 0.0;
         // What the controller makes of it must be what was planned.
-        let centre = point([from[0] + best[0], from[1] + best[1]]);
+        let centre = point(centre);
         let (a, b) = (point(from) - centre, point(to) - centre);
         let mut sweep = (b.atan2() - a.atan2()).rem_euclid(std::f64::consts::TAU);
         if clockwise {
@@ -209,7 +203,7 @@ impl Maker {
         }
         Some(Stroke {
             to,
-            arc: Some((best, clockwise)),
+            arc: Some((about, clockwise)),
             speed_percent: self.speed_percent,
         })
     }
@@ -301,7 +295,7 @@ mod tests {
                     prop_assert!(arcs && clockwise == (bulge < 0.0));
                     let r = (c[0] as f64).hypot(c[1] as f64);
                     let q = ((s.to[0] - from[0] - c[0]) as f64).hypot((s.to[1] - from[1] - c[1]) as f64);
-                    prop_assert!((r - q).abs() <= 1.0);
+                    prop_assert!((r - q).abs() <= RADII_UM);
                 }
                 from = s.to;
             }
