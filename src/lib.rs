@@ -12,11 +12,11 @@
 //! | stage | takes → gives |
 //! |---|---|
 //! | [`material`], [`machine`] | TOML → checked profiles |
-//! | [`mesh`] | file or sample → [`mesh::Surface`]: oriented, manifold, millimetres |
+//! | [`mesh`] | file or sample → [`mesh::Surface`]: oriented, manifold, millimetres; a body to form over |
 //! | [`conformal`] | surface, cones, darts → [`conformal::Layout`]: flat chart with the scale factor λ |
 //! | [`linkage`] | layout, edge length → [`linkage::Linkage`]: rigid triangles and hinges, flat and lifted |
 //! | [`rationalize`] | linkage, surface, σ → positions in space, [`rationalize::Quality`] |
-//! | [`pattern`] | linkage, hinge width, kerf → [`pattern::Sheet`]: slits and contours, as SVG |
+//! | [`pattern`] | linkage, hinge width, kerf → [`pattern::Sheet`]: slits, contours and marks; SVG, also edited, DXF, paper |
 //! | [`planner`] | moves, machine limits → motion in time |
 //! | [`toolpath`] | sheet → ordered cuts, the kerf allowed for |
 //! | [`gcode`] | cuts → text; text → what it burns, and a verdict |

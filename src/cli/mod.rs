@@ -3,7 +3,9 @@
 //! Exit codes: 0 done, 1 the answer is no, 2 bad usage or bad input. Results go to standard output (`--json` for
 //! machines), everything else to standard error.
 
+pub mod cut;
 pub mod flatten;
+pub mod form;
 pub mod inspect;
 mod inspect_linkage;
 pub mod layout_args;
@@ -18,7 +20,8 @@ pub mod send;
 pub mod sheet_args;
 pub mod sim;
 pub mod states;
-mod surface_args;
+pub mod surface_args;
+pub mod template;
 mod terminal;
 pub mod verify;
 
@@ -59,6 +62,12 @@ pub struct Global {
 enum Verb {
     /// From a surface to a verified, rehearsed job: the main thing
     Make(Box<make::MakeArgs>),
+    /// From a drawing, as `make` wrote it or edited since, to a verified, rehearsed job
+    Cut(cut::CutArgs),
+    /// Print a drawing at true size: a PDF tiled over pages of paper
+    Template(template::TemplateArgs),
+    /// A body to form the sheet over: the surface on a flat base, as a watertight STL
+    Form(form::FormArgs),
     /// The conformal map alone: try cones, darts and rims before a sheet is made
     Flatten(Box<flatten::FlattenArgs>),
     /// Show what a surface is like (topology, size, curvature, defects), or a linkage.obj (hinges, how it can move)
@@ -110,6 +119,9 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let global = &cli.global;
     let result = match &cli.verb {
         Verb::Make(args) => make::run(args, global, &terminal),
+        Verb::Cut(args) => cut::run(args, global, &terminal),
+        Verb::Template(args) => template::run(args, global, &terminal),
+        Verb::Form(args) => form::run(args, global, &terminal),
         Verb::Flatten(args) => flatten::run(args, global, &terminal),
         Verb::Verify(args) => verify::run(args, global, &terminal),
         Verb::Inspect(args) => inspect::run(args, global, &terminal),

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::cut::drawing_of;
 use super::{Failure, Global, Terminal};
 use crate::base::progress::Progress as _;
 use crate::control::{Job, JobRules, SendError, SendOptions, SendReport, SerialTransport, send};
@@ -62,7 +63,7 @@ pub(super) fn machine_for(asked: Option<&str>, job: &[u8]) -> Result<Option<Mach
 /// The job must be good for the machine, and cut its sheet if the drawing lies beside it: what `verify` would say.
 fn check_job(path: &Path, text: &[u8], machine: &Machine, args: &SendArgs) -> Result<(), Failure> {
     let text = String::from_utf8_lossy(text);
-    let beside = path.with_file_name("pattern.svg");
+    let beside = drawing_of(path);
     // Only our own jobs belong to the drawing beside them.
     let ours = gcode::machine_of(&text).is_some();
     let sheet = match std::fs::read_to_string(&beside) {

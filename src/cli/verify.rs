@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::cut::drawing_of;
 use super::send::machine_for;
 use super::{Failure, Global, Terminal, print, print_json};
 use crate::base::units::short;
@@ -17,7 +18,7 @@ use crate::{gcode, machine, pattern};
 pub struct VerifyArgs {
     /// The G-code
     job: PathBuf,
-    /// The sheet that it must cut [default: the pattern.svg beside it]
+    /// The sheet that it must cut [default: the SVG of the same name beside it, or pattern.svg]
     #[arg(long, value_name = "SVG")]
     sheet: Option<PathBuf>,
     /// The machine's profile [default: the one that the job's header names, or the standard one]
@@ -47,12 +48,8 @@ pub fn run(args: &VerifyArgs, global: &Global, terminal: &Terminal) -> Result<()
         None => machine::load(machine::DEFAULT).map_err(Failure::bad)?,
     };
     let sheet_path = args.sheet.clone().or_else(|| {
-        // job.nc goes with pattern.svg, job-2.nc with pattern-2.svg.
-        let name = args.job.file_stem()?.to_string_lossy().into_owned();
-        let number = name.strip_prefix("job").unwrap_or("");
-        let own = args.job.with_file_name(format!("pattern{number}.svg"));
-        let first = args.job.with_file_name("pattern.svg");
-        [own, first].into_iter().find(|path| path.is_file())
+        let beside = drawing_of(&args.job);
+        beside.is_file().then_some(beside)
     });
     let sheet = match &sheet_path {
         None => None,

@@ -13,6 +13,7 @@ mod round_trip;
 mod verify;
 mod write;
 
+pub use compare::Slack;
 pub use interpret::{Beam, Dialect, Move, Program, read, read_as};
 pub use ligament::Ligaments;
 pub use verify::{Finding, Rule, TOLERANCE_MM, Verdict, compare_burnt, verify};

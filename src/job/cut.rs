@@ -9,11 +9,12 @@ use serde_json::{Value, json};
 
 use super::MakeError;
 use crate::base::progress::Progress;
+use crate::base::units::short;
 use crate::control::JobRules;
-use crate::gcode::{self, compare_burnt};
+use crate::gcode::{self, Slack, compare_burnt};
 use crate::machine::{Machine, PowerMode};
 use crate::material::{CutSetting, Material};
-use crate::pattern::Sheet;
+use crate::pattern::{self, Sheet};
 use crate::planner::{self, Motion, total_s};
 use crate::sim::{RehearsalSummary, Settings, rehearse};
 use crate::toolpath::{CutOptions, Toolpath, plan};
@@ -51,6 +52,15 @@ fn stop_gap_mm(machine: &Machine) -> f64 {
         .x
         .hypot(machine.motion.acceleration_mm_per_s2.y);
     0.5 * fastest * DARK_S * DARK_S + gcode::TOLERANCE_MM
+}
+
+/// A real machine stands on steps of its motors: half of one in each axis comes on top of the verifier's tolerance.
+fn slack(machine: &Machine) -> Slack {
+    let [x, y, _] = Settings::of_machine(machine).steps_per_mm;
+    Slack {
+        sideways_mm: gcode::TOLERANCE_MM + (0.5 / x).hypot(0.5 / y),
+        gap_mm: stop_gap_mm(machine),
+    }
 }
 
 /// Plans, writes, verifies and rehearses the cut of `sheet`, which lies in its place on the bed.
@@ -131,7 +141,7 @@ fn rehearsed(
         &burnt,
         setting.passes,
         &gcode::Declared::of(gcode),
-        stop_gap_mm(machine),
+        slack(machine),
     )
     .map_err(MakeError::Toolpath)?;
     objections.extend(listed(
@@ -175,6 +185,75 @@ fn estimated_s(gcode: &str, machine: &Machine, setting: &CutSetting) -> f64 {
         }));
     }
     total_s(&motions, &Settings::of_machine(machine).limits())
+}
+
+/// A job made from a drawing.
+#[derive(Debug)]
+pub struct CutDrawing {
+    /// The program.
+    pub gcode: String,
+    /// The drawing that it cuts: where it was moved to, if it was.
+    pub drawing: String,
+    /// What was noticed and does not forbid the cut.
+    pub warnings: Vec<String>,
+    /// Why the job must not run; empty if it may.
+    pub objections: Vec<String>,
+    /// Figures of the job.
+    pub figures: Value,
+}
+
+/// A job from the text of a drawing, as [`pattern::svg()`] wrote it or edited since: checked for hinges that became too
+/// narrow, planned, written, verified against the drawing and rehearsed. With `place` the drawing is moved into the corner
+/// of the bed, else it is cut where it lies.
+///
+/// # Errors
+/// [`MakeError`] for a drawing that cannot be cut on this machine, for profiles that do not go together, or an interruption.
+pub fn cut_drawing(
+    text: &str,
+    machine: &str,
+    material: &str,
+    place: bool,
+    progress: &dyn Progress,
+) -> Result<CutDrawing, MakeError> {
+    let material = crate::material::load(material).map_err(MakeError::Material)?;
+    let machine = crate::machine::load(machine).map_err(MakeError::Machine)?;
+    let setting = material.cut_for(&machine).map_err(MakeError::Cut)?;
+    progress.start("reading the drawing", None);
+    let read = pattern::read_drawing(text).map_err(MakeError::Drawing)?;
+    let (mut sheet, mut warnings) = (read.sheet, read.warnings);
+    sheet.check_ligaments().map_err(MakeError::Pattern)?;
+    if place {
+        let (placed, motion) =
+            pattern::placed(&sheet, &machine, false).map_err(MakeError::Pattern)?;
+        let [cos, sin] = motion.turn;
+        let turned_deg = sin.atan2(cos).to_degrees();
+        if turned_deg != 0.0 {
+            warnings.push(format!(
+                "the drawing was turned by {}°, to fit the bed",
+                short(turned_deg, 0)
+            ));
+        }
+        sheet = placed;
+    }
+    pattern::on_bed(&sheet, &machine).map_err(MakeError::Pattern)?;
+    let drawn = sheet.metadata.kerf_mm;
+    if (drawn - setting.kerf_mm).abs() > 1e-9 {
+        warnings.push(format!(
+            "the drawing is made for a cut {} mm wide, and {} is cut {} mm wide on {}: hinges will be wider or narrower by the difference",
+            short(drawn, 3),
+            material.name,
+            short(setting.kerf_mm, 3),
+            machine.name
+        ));
+    }
+    let made = cut(&sheet, &machine, &material, &setting, progress)?;
+    Ok(CutDrawing {
+        figures: made.figures(),
+        drawing: pattern::svg(&sheet),
+        gcode: made.gcode,
+        warnings,
+        objections: made.objections,
+    })
 }
 
 /// The first few findings under a heading.

@@ -27,6 +27,7 @@ mod verdict;
 
 use std::path::PathBuf;
 
+pub use cut::{CutDrawing, cut_drawing};
 pub use design::{
     AlsoChoice, ConeChoice, CutChoice, DartChoice, Design, LinkageChoice, SheetChoice, SolveChoice,
     SurfaceChoice,
@@ -230,6 +231,9 @@ pub enum MakeError {
     /// No solution at all.
     #[error(transparent)]
     Rationalize(crate::rationalize::RationalizeError),
+    /// The drawing is no sheet.
+    #[error(transparent)]
+    Drawing(crate::pattern::SvgError),
     /// No sheet, or none that fits the bed.
     #[error(transparent)]
     Pattern(crate::pattern::PatternError),

@@ -4,6 +4,7 @@ use kurbo::{Point, Rect};
 use nalgebra::Point2;
 
 use super::MakeError;
+use super::make::title;
 use super::request::{FlapWish, Request};
 use super::shape::Stock;
 use crate::linkage::{Built, Flaps, TriangleId};
@@ -56,7 +57,7 @@ impl Sheets {
         if !this.built.overlaps.is_empty() {
             return Ok(this);
         }
-        let whole = draw(&this.built, &this.flaps, stock)?;
+        let whole = draw(&this.built, &this.flaps, request, stock)?;
         let area = stock.area();
         match pattern::placed_on(&whole, area.free, request.mirror) {
             Ok((sheet, motion)) => {
@@ -88,7 +89,7 @@ impl Sheets {
         }
         if !self.flaps.flaps.is_empty() {
             let without = self.flaps.none();
-            let bare = draw(&self.built, &without, stock)?;
+            let bare = draw(&self.built, &without, request, stock)?;
             if let Ok((sheet, motion)) = pattern::placed_on(&bare, area.free, request.mirror) {
                 self.sheets = vec![sheet];
                 self.placing = Placing::One(motion);
@@ -114,7 +115,7 @@ impl Sheets {
             FlapWish::Auto => self.built.flaps.clone(),
             FlapWish::None => self.built.flaps.none(),
         };
-        let whole = draw(&self.built, &self.flaps, stock)?;
+        let whole = draw(&self.built, &self.flaps, request, stock)?;
         self.put(&whole, request, area).map_err(MakeError::Pattern)
     }
 
@@ -171,8 +172,20 @@ impl Sheets {
     }
 }
 
-fn draw(built: &Built, flaps: &Flaps, stock: &Stock<'_>) -> Result<Sheet, MakeError> {
-    Sheet::with_flaps(&built.linkage, flaps, &stock.options).map_err(MakeError::Pattern)
+fn draw(
+    built: &Built,
+    flaps: &Flaps,
+    request: &Request,
+    stock: &Stock<'_>,
+) -> Result<Sheet, MakeError> {
+    let drawn = Sheet::with_flaps(&built.linkage, flaps, &stock.options);
+    let mut drawn = drawn.map_err(MakeError::Pattern)?;
+    let told = pattern::MarkOptions {
+        name: &title(&request.source),
+        back: request.mirror,
+    };
+    drawn.marks = pattern::marks(&built.linkage, &drawn, &told);
+    Ok(drawn)
 }
 
 impl Stock<'_> {

@@ -664,6 +664,16 @@ pub(super) mod tests {
         (linkage, rows(&net, &spots, &laid, &lattice))
     }
 
+    /// A cone of `size` triangles of `n` cells a side each, with `hole` rings left out at its tip, cut open.
+    pub(crate) fn cone_sheet(edge_mm: f64, size: usize, n: i32, hole: usize) -> (Linkage, Flaps) {
+        let laid = cone(size, n, hole);
+        let (net, lattice) = (Net::new(&laid), Lattice::new(edge_mm, 0.2));
+        let (spots, _) = lay(&net, 0, [(0, 0), (1, 0), (0, 1)], &|_, _| 1.0);
+        let cells = cells(&laid, &spots, &lattice);
+        let linkage = Linkage::assemble(edge_mm, Handedness::Right, &cells);
+        (linkage, rows(&net, &spots, &laid, &lattice))
+    }
+
     fn cells(laid: &[Laid], spots: &[[Spot; 3]], lattice: &Lattice) -> Vec<Cell> {
         laid.iter()
             .zip(spots)

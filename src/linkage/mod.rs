@@ -30,7 +30,7 @@ use nalgebra::{Point2, Point3};
 
 pub use continuity::{Fitted, fit};
 #[cfg(test)]
-pub(crate) use flaps::tests::cylinder as cylinder_with_flaps;
+pub(crate) use flaps::tests::{cone_sheet as cone_with_flaps, cylinder as cylinder_with_flaps};
 pub use flaps::{Flap, Flaps, SeamSegment};
 pub use gltf::write_glb;
 pub use guide::SeamGuide;

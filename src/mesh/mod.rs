@@ -4,6 +4,7 @@
 //! - [`repair`]: triangles into a surface: mended where that needs no guess, refused with place and remedy elsewhere;
 //! - [`samples`]: surfaces made here, by name;
 //! - [`closest`]: the closest point on a surface; [`edit`]: a point made a vertex, slits;
+//! - [`body`]: a solid body below a surface, to form over;
 //! - [`check`]: figures for people; [`mod@write`]: OBJ text.
 //!
 //! ```
@@ -15,6 +16,7 @@
 //! # Ok::<(), kagome::mesh::SampleError>(())
 //! ```
 
+pub mod body;
 pub mod check;
 pub mod closest;
 pub mod edit;
@@ -26,6 +28,7 @@ mod surface;
 pub mod units;
 pub mod write;
 
+pub use body::{Body, BodyError, BodyOptions};
 pub use closest::{Closest, ClosestPoint, ClosestTracker, Feature, distance_to_triangle};
 pub use edit::{EditError, insert_point, slit};
 pub use error::{ImportError, Problem};

@@ -165,6 +165,35 @@ pub fn placed_on(sheet: &Sheet, free: Rect, mirror: bool) -> Result<(Sheet, Moti
     Ok((motion.sheet(sheet), motion))
 }
 
+/// Checks that a sheet can be cut where it lies.
+///
+/// # Errors
+/// [`PatternError::OffBed`] with both extents.
+pub fn on_bed(sheet: &Sheet, machine: &Machine) -> Result<(), PatternError> {
+    let reach = machine.reach();
+    // The middle of the beam runs half a kerf outside the contour.
+    let half = 0.5 * sheet.metadata.kerf_mm;
+    let cut = sheet.bounds().inflate(half, half);
+    let inside = cut.x0 >= reach.min[0]
+        && cut.y0 >= reach.min[1]
+        && cut.x1 <= reach.max[0]
+        && cut.y1 <= reach.max[1];
+    if inside {
+        return Ok(());
+    }
+    Err(PatternError::OffBed {
+        x0: cut.x0,
+        y0: cut.y0,
+        x1: cut.x1,
+        y1: cut.y1,
+        machine: machine.name.clone(),
+        from_x: reach.min[0],
+        from_y: reach.min[1],
+        to_x: reach.max[0],
+        to_y: reach.max[1],
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::sheet::SheetOptions;

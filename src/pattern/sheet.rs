@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use kurbo::{Point, Rect, Vec2};
 
 use super::contour;
+use super::ligament::Ligament;
 use super::mark::Mark;
 use super::star;
 use crate::base::curve::Curve;
@@ -114,6 +115,22 @@ impl SheetOptions {
             corner_radius_mm: 0.0,
             alignment_hole_mm: 0.0,
         }
+    }
+
+    /// The numbers that go with a sheet of triangles of this edge.
+    pub fn metadata(&self, edge_mm: f64) -> SheetMetadata {
+        SheetMetadata {
+            hinge_width_mm: self.hinge_width_mm,
+            kerf_mm: self.kerf_mm,
+            edge_mm,
+            tip: self.tip,
+            corner_radius_mm: self.corner_radius_mm,
+        }
+    }
+
+    /// The ligaments of such a sheet, of this thickness.
+    pub fn ligament(&self, edge_mm: f64, thickness_mm: f64) -> Ligament {
+        Ligament::of(&self.metadata(edge_mm), thickness_mm)
     }
 }
 
@@ -266,6 +283,46 @@ pub enum PatternError {
         /// Where.
         y: f64,
     },
+    /// A ligament of an edited drawing is too narrow.
+    #[error(
+        "near ({x:.3}, {y:.3}) mm only {width_mm:.3} mm of material are left between a slit and {other}, and the drawing asks for hinges of {hinge_width_mm} mm: move or shorten the slit"
+    )]
+    Thin {
+        /// Where.
+        x: f64,
+        /// Where.
+        y: f64,
+        /// What is left; 0 where cuts cross.
+        width_mm: f64,
+        /// What is asked for.
+        hinge_width_mm: f64,
+        /// `another slit` or `the contour`.
+        other: &'static str,
+    },
+    /// A drawing that is not on the bed.
+    #[error(
+        "the drawing lies at ({x0:.1}, {y0:.1}) to ({x1:.1}, {y1:.1}) mm with its cut, and machine `{machine}` reaches from ({from_x:.1}, {from_y:.1}) to ({to_x:.1}, {to_y:.1}) mm: move it in the drawing program, or let it be moved into the corner (--place)"
+    )]
+    OffBed {
+        /// Left of the drawing.
+        x0: f64,
+        /// Its lower edge.
+        y0: f64,
+        /// Its right.
+        x1: f64,
+        /// Its upper edge.
+        y1: f64,
+        /// The machine.
+        machine: String,
+        /// Left of the bed.
+        from_x: f64,
+        /// Its lower edge.
+        from_y: f64,
+        /// Its right.
+        to_x: f64,
+        /// Its upper edge.
+        to_y: f64,
+    },
     /// Larger than the bed.
     #[error(
         "the sheet is {width_mm:.1} x {height_mm:.1} mm with its cut, and there is room for {bed_width_mm:.1} x {bed_height_mm:.1} mm inside the margins, whichever way it is turned. It fits with triangles of edge {fitting_edge_mm:.3} mm or less in the same number (--scale {fitting_scale:.4} of this size), or on a larger machine"
@@ -391,13 +448,7 @@ impl Sheet {
         flaps: &Flaps,
         options: &SheetOptions,
     ) -> Result<Self, PatternError> {
-        let metadata = SheetMetadata {
-            hinge_width_mm: options.hinge_width_mm,
-            kerf_mm: options.kerf_mm,
-            edge_mm: linkage.edge_mm,
-            tip: options.tip,
-            corner_radius_mm: options.corner_radius_mm,
-        };
+        let metadata = options.metadata(linkage.edge_mm);
         metadata.check()?;
         if linkage.triangles.is_empty() {
             return Err(PatternError::Empty);
@@ -561,7 +612,7 @@ fn slits(
 }
 
 /// For corner `k` of triangle `t` at `3 t + k`: a number shared by all corners of one fan around one point.
-fn flat_vertices(
+pub(super) fn flat_vertices(
     triangles: &Per<TriangleId, Triangle>,
     neighbours: &Per<TriangleId, [Option<(TriangleId, usize)>; 3]>,
 ) -> Vec<u32> {
