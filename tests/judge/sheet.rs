@@ -83,7 +83,8 @@ pub struct Burnt {
     pub faults: Vec<String>,
 }
 
-/// Runs the few words that a laser job needs: G0/G1 modal, X, Y, F, S, M3/M4/M5, G20/G21, G90/G91, M2.
+/// Runs the few words that a laser job needs: G0 to G3 modal, X, Y, I, J, F, S, M3/M4/M5, G20/G21, G90/G91, M2. Arcs
+/// become pieces of two degrees.
 pub fn burn(gcode: &str) -> Burnt {
     let (mut at, mut motion, mut beam, mut power, mut feed) = ([0.0, 0.0], None, false, 0.0, 0.0);
     let (mut mm, mut absolute, mut ended) = (false, false, false);
@@ -96,13 +97,13 @@ pub fn burn(gcode: &str) -> Burnt {
         if line.len() > 79 {
             out.faults.push(format!("line {} is too long", n + 1));
         }
-        let (mut to, mut moves) = (at, false);
+        let (mut to, mut moves, mut to_centre) = (at, false, [0.0, 0.0]);
         for word in line.split_whitespace() {
             let value: f64 = word[1..]
                 .parse()
                 .unwrap_or_else(|_| panic!("line {}: {word}", n + 1));
             match (&word[..1], value as i64) {
-                ("G", 0 | 1) => motion = Some(value as i64),
+                ("G", 0..=3) => motion = Some(value as i64),
                 ("G", 20) => out.faults.push("inches".into()),
                 ("G", 21) => mm = true,
                 ("G", 90) => absolute = true,
@@ -113,6 +114,8 @@ pub fn burn(gcode: &str) -> Burnt {
                 ("M", 2 | 30) => ended = true,
                 ("X", _) => (to[0], moves) = (value, true),
                 ("Y", _) => (to[1], moves) = (value, true),
+                ("I", _) => to_centre[0] = value,
+                ("J", _) => to_centre[1] = value,
                 ("F", _) => feed = value,
                 ("S", _) => power = value,
                 _ => {}
@@ -125,12 +128,18 @@ pub fn burn(gcode: &str) -> Burnt {
             out.faults
                 .push(format!("line {}: a move outside G21 G90 … M2", n + 1));
         }
-        if motion == Some(1) {
+        if motion != Some(0) {
             if feed <= 0.0 {
                 out.faults.push(format!("line {}: no feed", n + 1));
             }
             if beam && power > 0.0 {
-                out.pieces.push([at, to]);
+                match motion {
+                    Some(2 | 3) => {
+                        let centre = [at[0] + to_centre[0], at[1] + to_centre[1]];
+                        arc(at, to, centre, motion == Some(2), &mut out);
+                    }
+                    _ => out.pieces.push([at, to]),
+                }
             }
         }
         at = to;
@@ -140,6 +149,37 @@ pub fn burn(gcode: &str) -> Burnt {
             .push("the program ends with the beam on, or not at all".into());
     }
     out
+}
+
+/// An arc as pieces; its two radii must agree as GRBL wants it.
+fn arc(from: P, to: P, centre: P, clockwise: bool, out: &mut Burnt) {
+    let polar = |p: P| {
+        let d = [p[0] - centre[0], p[1] - centre[1]];
+        (d[0].hypot(d[1]), d[1].atan2(d[0]))
+    };
+    let ((r, a), (s, b)) = (polar(from), polar(to));
+    if (r - s).abs() > 0.005 {
+        out.faults
+            .push(format!("error:33 at {from:?}: radii {r} and {s}"));
+    }
+    let turn = std::f64::consts::TAU;
+    let sweep = if clockwise {
+        -(a - b).rem_euclid(turn)
+    } else {
+        (b - a).rem_euclid(turn)
+    };
+    let steps = (sweep.abs().to_degrees() / 2.0).ceil().max(1.0) as usize;
+    let mut last = from;
+    for k in 1..=steps {
+        let t = k as f64 / steps as f64;
+        let (radius, angle) = (r + t * (s - r), a + t * sweep);
+        let next = [
+            centre[0] + radius * angle.cos(),
+            centre[1] + radius * angle.sin(),
+        ];
+        out.pieces.push([last, next]);
+        last = next;
+    }
 }
 
 fn distance(p: P, s: &[P; 2]) -> f64 {
