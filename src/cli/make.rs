@@ -304,14 +304,16 @@ fn text(made: &Made, folder: &Path) -> String {
         lines.push(format!("warning: {warning}"));
     }
     if made.verdict.pass {
+        let job = folder.join("job.nc");
         lines.push(format!(
             "Written to {}; open report.html first, then:",
             folder.display()
         ));
-        lines.push(format!(
-            "  kagome send {} --port PORT",
-            folder.join("job.nc").display()
-        ));
+        lines.push(if made.streamed {
+            format!("  kagome send {} --port PORT", job.display())
+        } else {
+            format!("  load {} at the machine's own controller", job.display())
+        });
     }
     lines.join("\n") + "\n"
 }

@@ -141,6 +141,8 @@ pub struct Made {
     pub warnings: Vec<String>,
     /// The result in a few lines, for a person.
     pub summary: Vec<(String, String)>,
+    /// Whether the machine is one to which jobs are sent; the others are given the file.
+    pub streamed: bool,
     /// All figures.
     pub figures: Value,
     /// The files, by name, of [`FILES`]: without pattern and job if the verdict is no, and linkage and layout on as many
@@ -337,6 +339,7 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         qualities,
         warnings,
         summary,
+        streamed: machine.controller.is_streamed(),
         figures,
         files,
     })

@@ -263,11 +263,15 @@ pub(crate) fn summary(
         lines.push((
             name,
             format!(
-                "{} strokes, {} m cut, {} m travel, {} on the simulated machine",
+                "{} strokes, {} m cut, {} m travel, {} {}",
                 cut.toolpath.cuts.len(),
                 short(cut.cut_length_mm / 1000.0, 2),
                 short(cut.travel_mm / 1000.0, 2),
                 duration(cut.machine_s),
+                match cut.rehearsal {
+                    Some(_) => "on the simulated machine",
+                    None => "by the planner",
+                },
             ),
         ));
     }
