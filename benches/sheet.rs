@@ -38,8 +38,12 @@ fn case(radius: i32) -> Case {
     let linkage = Linkage::patch(7.0, Handedness::Right, &Linkage::hexagon_cells(radius));
     let sheet = sheet(&linkage, &setting);
     let (sheet, _) = pattern::placed(&sheet, &machine, false).expect("a large bed");
-    let toolpath = toolpath::plan(&sheet, &toolpath::CutOptions::of(&setting), [0.0, 0.0])
-        .expect("wide slots");
+    let toolpath = toolpath::plan(
+        &sheet,
+        &toolpath::CutOptions::of(&setting, &machine, None),
+        [0.0, 0.0],
+    )
+    .expect("wide slots");
     let text = gcode::write(&toolpath, &machine, &material).expect("short lines");
     Case {
         linkage,
@@ -77,7 +81,13 @@ fn svg_read(bencher: divan::Bencher<'_, '_>, radius: i32) {
 #[divan::bench(args = RADII, sample_count = 5)]
 fn order(bencher: divan::Bencher<'_, '_>, radius: i32) {
     let c = case(radius);
-    bencher.bench(|| toolpath::plan(&c.sheet, &toolpath::CutOptions::of(&c.setting), [0.0, 0.0]));
+    bencher.bench(|| {
+        toolpath::plan(
+            &c.sheet,
+            &toolpath::CutOptions::of(&c.setting, &c.machine, None),
+            [0.0, 0.0],
+        )
+    });
 }
 
 #[divan::bench(args = RADII)]

@@ -39,7 +39,7 @@ fn the_flat_hexagon_is_drawn_and_cut_as_ever() {
     let park = machine.job.park;
     let path = toolpath::plan(
         &sheet,
-        &toolpath::CutOptions::of(&setting),
+        &toolpath::CutOptions::of(&setting, &machine, None),
         [park.x_mm, park.y_mm],
     )
     .unwrap();

@@ -7,6 +7,7 @@
 //! - [`atomic`]: outputs that appear complete or not at all;
 //! - [`document`]: TOML that a person wrote, read strictly and blamed exactly;
 //! - [`sparse`]: symmetric positive definite systems, with the symbolic factor kept between solves;
+//! - [`starting`]: a profile of one's own from a shipped one, with an explanation of every key;
 //! - [`union`]: disjoint sets;
 //! - [`units`]: the few conversions and number formats that several rooms share.
 
@@ -17,5 +18,6 @@ pub mod document;
 pub mod ids;
 pub mod progress;
 pub mod sparse;
+pub mod starting;
 pub mod union;
 pub mod units;

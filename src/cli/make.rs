@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::layout_args::{CutArg, LayoutArgs, SizeArgs};
+use super::sheet_args::SheetArgs;
 use super::surface_args::{SurfaceArgs, source};
 use super::{Failure, Global, Terminal, print, print_json};
 use crate::base::atomic::check_directory;
@@ -47,6 +48,8 @@ pub struct MakeArgs {
     /// Width of the cut, in place of the material's
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     kerf: Option<f64>,
+    #[command(flatten)]
+    sheet: SheetArgs,
     #[command(flatten)]
     layout: LayoutArgs,
     /// A path that the seam follows where it can, past two or more places, X,Y,Z;X,Y,Z or vN;vN; repeatable. A dart opens
@@ -196,7 +199,12 @@ fn decided_by_design(args: &MakeArgs) -> Vec<&'static str> {
     ]
     .into_iter()
     .filter_map(|(given, name)| given.then_some(name));
-    let shared = args.size.given().into_iter().chain(args.layout.given());
+    let shared = args
+        .size
+        .given()
+        .into_iter()
+        .chain(args.layout.given())
+        .chain(args.sheet.given());
     shared.chain(own).collect()
 }
 
@@ -232,6 +240,7 @@ fn from_arguments(args: &MakeArgs) -> Result<Request, Failure> {
         hinge_width_mm: args.hinge,
         kerf_mm: args.kerf,
         mirror: args.mirror,
+        sheet: args.sheet.wish(),
         sizing: args.size.sizing(),
         cones: args.layout.cones()?,
         darts: args.layout.darts()?,

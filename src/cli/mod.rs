@@ -14,11 +14,13 @@ pub mod make;
 pub mod materials;
 pub mod ports;
 pub mod pose;
+mod profiles;
 pub mod samples;
 pub mod send;
+pub mod sheet_args;
 pub mod sim;
 pub mod states;
-pub mod surface_args;
+mod surface_args;
 pub mod template;
 mod terminal;
 pub mod verify;
@@ -76,9 +78,9 @@ enum Verb {
     States(states::StatesArgs),
     /// List the sample surfaces, or write one as a file
     Samples(samples::SamplesArgs),
-    /// List, show and check machines
+    /// List, show, check and start machines
     Machines(machines::MachinesArgs),
-    /// List, show and check materials
+    /// List, show, check and start materials
     Materials(materials::MaterialsArgs),
     /// Read G-code back and judge it: bed, beam, modes, and every cut of its sheet
     Verify(verify::VerifyArgs),

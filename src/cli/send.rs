@@ -63,15 +63,17 @@ pub(super) fn machine_for(asked: Option<&str>, job: &[u8]) -> Result<Option<Mach
 /// The job must be good for the machine, and cut its sheet if the drawing lies beside it: what `verify` would say.
 fn check_job(path: &Path, text: &[u8], machine: &Machine, args: &SendArgs) -> Result<(), Failure> {
     let text = String::from_utf8_lossy(text);
-    let beside = drawing_of(path);
     // Only our own jobs belong to the drawing beside them.
     let ours = gcode::machine_of(&text).is_some();
-    let sheet = match std::fs::read_to_string(&beside) {
-        Ok(drawing) if ours => Some(
-            pattern::read_svg(&drawing)
-                .map_err(|e| Failure::Bad(format!("{}: {e}", beside.display())))?,
-        ),
-        _ => None,
+    let beside = drawing_of(path).filter(|_| ours);
+    let sheet = match &beside {
+        Some(beside) => {
+            let wrong = |e: String| Failure::Bad(format!("{}: {e}", beside.display()));
+            let drawing = std::fs::read_to_string(beside)
+                .map_err(|e| wrong(format!("cannot be read: {e}")))?;
+            Some(pattern::read_svg(&drawing).map_err(|e| wrong(e.to_string()))?)
+        }
+        None => None,
     };
     let verdict = gcode::verify(&text, machine, sheet.as_ref(), None).map_err(Failure::bad)?;
     let findings: Vec<String> = verdict
@@ -104,14 +106,26 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
         ))
     })?;
     let machine = machine_for(args.machine.as_deref(), &text)?;
+    if let Some(m) = machine.as_ref().filter(|m| !m.controller.is_streamed()) {
+        return Err(Failure::Bad(format!(
+            "machine {} has {}, to which nothing is streamed: open {} there as a file. Nothing was sent",
+            m.name,
+            m.controller,
+            args.job.display()
+        )));
+    }
     let rules = JobRules {
         allow_constant_power: args.allow_constant_power,
-        ..JobRules::default()
+        line_limit: machine
+            .as_ref()
+            .map_or(JobRules::default().line_limit, Machine::line_limit),
     };
     if args.s_max.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
         return Err(Failure::Bad("--s-max must be a number above zero".into()));
     }
-    let s_max = args.s_max.or(machine.as_ref().map(|m| m.laser.s_max));
+    let s_max = args
+        .s_max
+        .or(machine.as_ref().and_then(|m| Some(m.laser()?.s_max)));
     let here = |error| Failure::Bad(format!("{}: {error}", args.job.display()));
     if let Some(machine) = &machine {
         // First the plain faults, in the sender's words.
@@ -152,7 +166,7 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
         s_max,
         buffer: machine
             .as_ref()
-            .map(|m| m.connection.receive_buffer_bytes as usize),
+            .and_then(|m| Some(m.connection.as_ref()?.receive_buffer_bytes as usize)),
         ..SendOptions::default()
     };
     // From the opening on: it resets the board, and an exit in between would leave it to itself.
@@ -163,7 +177,7 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
     };
     let baud = args
         .baud
-        .or(machine.map(|m| m.connection.baud))
+        .or(machine.and_then(|m| Some(m.connection?.baud)))
         .unwrap_or(STANDARD_BAUD);
     let mut port = SerialTransport::open(&args.port, baud).map_err(Failure::bad)?;
     let result = send(&mut port, &job, &options, terminal);

@@ -51,6 +51,12 @@ fn speed(text: &str) -> Result<Speed, String> {
 /// Serves until Ctrl-C, or until the sender leaves.
 pub fn run(args: &SimArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
     let machine = crate::machine::load(&args.machine).map_err(Failure::bad)?;
+    if !machine.controller.is_streamed() {
+        return Err(Failure::Bad(format!(
+            "machine {} has {}, which opens jobs as files: there is no port to serve",
+            machine.name, machine.controller
+        )));
+    }
     let mut server = PtyServer::open().map_err(Failure::bad)?;
     let _link = match &args.link {
         Some(path) => Some(Link::new(path, server.path()).map_err(Failure::bad)?),
@@ -68,7 +74,8 @@ pub fn run(args: &SimArgs, global: &Global, terminal: &Terminal) -> Result<(), F
     let how = Serve {
         speed: args.speed.0,
         once: args.once,
-        reset_on_open: machine.connection.reset_on_open && !args.no_reset_on_open,
+        reset_on_open: machine.connection.is_some_and(|c| c.reset_on_open)
+            && !args.no_reset_on_open,
     };
     server.run(&mut controller, how, |_| terminal.interrupted());
     // The line is gone, the machine is not: what it had in its buffers still runs, as on a real one.

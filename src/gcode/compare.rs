@@ -77,8 +77,14 @@ impl Wanted {
                 // Two arcs of radius R that touch stay within τ of each other for √(τR).
                 3.0 * (TOLERANCE_MM * (sheet.metadata.corner_radius_mm + 0.5 * kerf)).sqrt()
             };
+            // Where a slit widens, its sides leave it at 30° or 90°.
+            let widening = if star.arms.iter().any(|a| a.tip.is_some()) {
+                2.0 * JOINT_MM
+            } else {
+                0.0
+            };
             for line in star.lines() {
-                wanted.add(Kind::Slit, &line, tangential, None);
+                wanted.add(Kind::Slit, &line, tangential.max(widening), None);
             }
         }
         // Leads meet contours at a slant, and those to slits on the rim cross it.

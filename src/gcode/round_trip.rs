@@ -10,8 +10,9 @@ use crate::base::ids::Id;
 use crate::linkage::{Handedness, Linkage, TriangleId};
 use crate::machine::{self, Machine};
 use crate::material;
+use crate::material::PassOrder;
 use crate::pattern::{Label, Mark, MarkKind, Sheet, SheetOptions, Tip, placed, read_svg, svg};
-use crate::toolpath::{CornerSlowdown, CutOptions, PassOrder, plan};
+use crate::toolpath::{CornerSlowdown, CutOptions, plan};
 
 /// The largest edge-connected part of a hexagon of cells without those of `removed`.
 fn patch(handedness: Handedness, removed: &BTreeSet<usize>) -> Linkage {
@@ -64,7 +65,12 @@ fn job(linkage: &Linkage, passes: u32, mirror: bool) -> (Sheet, String, Machine)
     let (sheet, _) = placed(&sheet, &machine, mirror).unwrap();
     // What the verifier gets is the drawing, not our memory of it.
     let sheet = read_svg(&svg(&sheet)).unwrap();
-    let toolpath = plan(&sheet, &CutOptions::of(&setting), [0.0, 0.0]).unwrap();
+    let toolpath = plan(
+        &sheet,
+        &CutOptions::of(&setting, &machine, None),
+        [0.0, 0.0],
+    )
+    .unwrap();
     let text = write(&toolpath, &machine, &material).unwrap();
     (sheet, text, machine)
 }
@@ -123,7 +129,7 @@ fn wide_cut(pierce_mm: f64, passes: u32, pass_order: PassOrder) -> CutOptions {
             percent: 60.0,
         }),
         engrave: Some((3000.0, 5.0)),
-        ..CutOptions::of(&material.cut_for(&machine).unwrap())
+        ..CutOptions::of(&material.cut_for(&machine).unwrap(), &machine, None)
     }
 }
 

@@ -196,7 +196,7 @@ pub fn verify(
 }
 
 fn check_lines(text: &str, machine: &Machine, findings: &mut Vec<Finding>) {
-    let limit = machine.controller.line_limit();
+    let limit = machine.line_limit();
     for (i, line) in text.lines().enumerate() {
         if line.len() > limit {
             findings.push(Finding::at(
@@ -234,7 +234,10 @@ fn check_moves(program: &Program, machine: &Machine, findings: &mut Vec<Finding>
         .rate_mm_per_min
         .x
         .max(machine.motion.rate_mm_per_min.y);
-    if machine.laser.power_mode == PowerMode::Dynamic {
+    if machine
+        .laser()
+        .is_some_and(|l| l.power_mode == PowerMode::Dynamic)
+    {
         for &line in &program.constant_power {
             findings.push(Finding::at(
                 line,
@@ -291,14 +294,14 @@ fn check_moves(program: &Program, machine: &Machine, findings: &mut Vec<Finding>
                 ),
             );
         }
-        if m.power > machine.laser.s_max {
+        if let Some(laser) = machine.laser().filter(|l| m.power > l.s_max) {
             say(
                 m.line,
                 Rule::Power,
                 format!(
                     "S{} is above the machine's full power, S{}",
                     short(m.power, 3),
-                    short(machine.laser.s_max, 3)
+                    short(laser.s_max, 3)
                 ),
             );
         }

@@ -23,6 +23,12 @@ pub enum GcodeError {
         /// The limit.
         limit: usize,
     },
+    /// No G-code is written for such a machine yet.
+    #[error("no G-code is written for machine `{machine}` yet: it has no laser")]
+    NoDialect {
+        /// The machine.
+        machine: String,
+    },
     /// A coordinate is not a number.
     #[error("a cut has a coordinate that is not a number, near ({x}, {y})")]
     NotFinite {
@@ -157,6 +163,11 @@ pub fn write(
     machine: &Machine,
     material: &Material,
 ) -> Result<String, GcodeError> {
+    let Some(laser) = machine.laser() else {
+        return Err(GcodeError::NoDialect {
+            machine: machine.name.clone(),
+        });
+    };
     let figures = toolpath.figures();
     let mut w = Writer {
         lines: Vec::new(),
@@ -202,9 +213,9 @@ pub fn write(
     w.line("G17");
     w.line("G94");
     w.lines.extend(machine.job.preamble.iter().cloned());
-    let air = machine.laser.air_on.is_some();
-    w.lines.extend(machine.laser.air_on.iter().cloned());
-    w.line(match machine.laser.power_mode {
+    let air = laser.air_on.is_some();
+    w.lines.extend(laser.air_on.iter().cloned());
+    w.line(match laser.power_mode {
         PowerMode::Dynamic => "M4 S0",
         PowerMode::Constant => "M3 S0",
     });
@@ -225,7 +236,7 @@ pub fn write(
         }
         let feed = short(cut.feed_mm_per_min, 0);
         // Hundredths of a per cent and better, whatever the scale of S.
-        let power = short(machine.laser.s_max * cut.power_percent / 100.0, 1);
+        let power = short(laser.s_max * cut.power_percent / 100.0, 1);
         for (i, step) in cut.steps().into_iter().enumerate() {
             if i == 0 {
                 w.go("G0", step.piece.from, None);
@@ -242,12 +253,12 @@ pub fn write(
     }
     w.line("M5");
     if air {
-        w.lines.extend(machine.laser.air_off.iter().cloned());
+        w.lines.extend(laser.air_off.iter().cloned());
     }
     let park = machine.job.park;
     w.go("G0", Point::new(park.x_mm, park.y_mm), None);
     w.lines.extend(machine.job.postamble.iter().cloned());
-    let limit = machine.controller.line_limit();
+    let limit = machine.line_limit();
     if let Some(line) = w.lines.iter().find(|l| l.len() > limit) {
         return Err(GcodeError::LineTooLong {
             line: line.clone(),

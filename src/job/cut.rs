@@ -62,8 +62,9 @@ pub(crate) fn cut(
     progress: &dyn Progress,
 ) -> Result<CutResult, MakeError> {
     progress.start("toolpath", None);
-    let toolpath =
-        plan(sheet, &CutOptions::of(setting), machine.park_mm()).map_err(MakeError::Toolpath)?;
+    let marks = material.mark_for(machine);
+    let options = CutOptions::of(setting, machine, marks.as_ref());
+    let toolpath = plan(sheet, &options, machine.park_mm()).map_err(MakeError::Toolpath)?;
     progress.check()?;
     let gcode = gcode::write(&toolpath, machine, material).map_err(MakeError::Gcode)?;
 
@@ -78,8 +79,10 @@ pub(crate) fn cut(
 
     progress.start("rehearsing on the simulated machine", None);
     let rules = JobRules {
-        allow_constant_power: machine.laser.power_mode == PowerMode::Constant,
-        ..JobRules::default()
+        allow_constant_power: machine
+            .laser()
+            .is_some_and(|l| l.power_mode == PowerMode::Constant),
+        line_limit: machine.line_limit(),
     };
     let rehearsal = rehearse(
         gcode.as_bytes(),
@@ -170,8 +173,8 @@ pub fn cut_drawing(
     if place {
         let (placed, motion) =
             pattern::placed(&sheet, &machine, false).map_err(MakeError::Pattern)?;
-        if motion.quarter_turn {
-            warnings.push("the drawing was turned by 90°, to fit the bed".into());
+        if motion.turn != [1.0, 0.0] {
+            warnings.push("the drawing was turned, to fit the bed".into());
         }
         sheet = placed;
     }

@@ -9,11 +9,13 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::MakeError;
-use super::request::{ConePlace, ConeWish, DartWish, FlapWish, Request, Source};
+use super::request::{ConePlace, ConeWish, DartWish, FlapWish, Request, SheetWish, Source};
 use crate::base::document::{Complaint, Document, ranged};
 use crate::conformal::Sizing;
 use crate::linkage::Handedness;
+use crate::material::TipShape;
 use crate::mesh::{ImportOptions, PartChoice, Unit, Units};
+use crate::pattern::Tip;
 use crate::rationalize::Solver;
 
 /// The version of the format that this program writes and reads.
@@ -99,6 +101,57 @@ pub struct SheetChoice {
     /// True if the beam strikes the back.
     #[serde(default, skip_serializing_if = "is_false")]
     pub mirror: bool,
+    /// Width and height of the piece of stock, millimetres; absent: as large as the bed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stock_mm: Option<[f64; 2]>,
+    /// True if a sheet that does not fit is refused and not divided.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub undivided: bool,
+    /// Shape of the slits' tips; absent: as the beam leaves them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip: Option<TipShape>,
+    /// Finished radius of those tips, millimetres.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub tip_radius_mm: f64,
+    /// Finished radius of the triangles' corners, millimetres.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub corner_radius_mm: f64,
+    /// Diameter of the holes in flaps and their doubles, millimetres.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub alignment_hole_mm: f64,
+    /// Tabs for each part.
+    #[serde(default, skip_serializing_if = "is_none_of")]
+    pub tabs: usize,
+    /// Width of each, millimetres.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub tab_width_mm: f64,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+fn is_none_of(count: &usize) -> bool {
+    *count == 0
+}
+
+impl SheetChoice {
+    fn wish(&self) -> SheetWish {
+        let radius_mm = self.tip_radius_mm;
+        SheetWish {
+            stock_mm: self.stock_mm,
+            divide: !self.undivided,
+            tip: Some(match self.tip {
+                None | Some(TipShape::Plain) => Tip::Plain,
+                Some(TipShape::Round) => Tip::Round { radius_mm },
+                Some(TipShape::Teardrop) => Tip::Teardrop { radius_mm },
+            }),
+            corner_radius_mm: Some(self.corner_radius_mm),
+            alignment_hole_mm: self.alignment_hole_mm,
+            tabs: self.tabs,
+            tab_width_mm: self.tab_width_mm,
+        }
+    }
 }
 
 /// `[linkage]`.
@@ -283,6 +336,31 @@ impl Design {
             100.0,
         )?;
         ranged("sheet.kerf_mm", self.sheet.kerf_mm, 0.0, 20.0)?;
+        for size in self.sheet.stock_mm.into_iter().flatten() {
+            ranged("sheet.stock_mm", size, 1.0, 1e5)?;
+        }
+        ranged("sheet.tip_radius_mm", self.sheet.tip_radius_mm, 0.0, 100.0)?;
+        let wide = self.sheet.tip.is_some_and(|tip| tip != TipShape::Plain);
+        if wide != (self.sheet.tip_radius_mm > 0.0) {
+            return Err(Complaint::new(
+                "sheet.tip_radius_mm",
+                "goes with tip: give both or neither",
+            ));
+        }
+        ranged(
+            "sheet.corner_radius_mm",
+            self.sheet.corner_radius_mm,
+            0.0,
+            100.0,
+        )?;
+        ranged(
+            "sheet.alignment_hole_mm",
+            self.sheet.alignment_hole_mm,
+            0.0,
+            100.0,
+        )?;
+        ranged("sheet.tabs", self.sheet.tabs as f64, 0.0, 1000.0)?;
+        ranged("sheet.tab_width_mm", self.sheet.tab_width_mm, 0.0, 100.0)?;
         ranged("linkage.edge_mm", self.linkage.edge_mm, 0.01, 1e5)?;
         ranged(
             "linkage.orientation_deg",
@@ -389,6 +467,7 @@ impl Design {
             hinge_width_mm: Some(self.sheet.hinge_width_mm),
             kerf_mm: Some(self.sheet.kerf_mm),
             mirror: self.sheet.mirror,
+            sheet: self.sheet.wish(),
             sizing: Sizing::EdgeMm(self.linkage.edge_mm),
             cones: ConeWish::Given(cones),
             darts: DartWish::Given(darts.collect()),

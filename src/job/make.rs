@@ -17,7 +17,7 @@ use super::design::{
 };
 use super::load::{Also, Loaded, MOST_SURFACES, load};
 use super::maps::cone_opening_mm;
-use super::report::{self, Page, Pose, Stroke};
+use super::report::{self, DrawnSheet, Page, Pose, Stroke};
 use super::request::{Request, Source};
 use super::several::choose_for_all;
 use super::shape::{Fit, Stock, on_shape};
@@ -28,14 +28,14 @@ use crate::base::progress::Progress;
 use crate::conformal::{Cone, Dart, Flattened, Layout, Sizing};
 use crate::linkage::{write_glb, write_obj};
 use crate::machine::Machine;
-use crate::material::{CutSetting, Material};
+use crate::material::{CutSetting, Material, TipShape};
 use crate::mesh::{PartChoice, Surface, write};
-use crate::pattern;
+use crate::pattern::{self, SheetOptions, Tip};
 use crate::rationalize::{Quality, Solver, hinge_scales};
 use crate::toolpath::{Role, Toolpath};
 
 /// Names of all files that `make` may write, for replacing an earlier result safely.
-pub const FILES: [&str; 25] = [
+pub const FILES: [&str; 82] = [
     "design.toml",
     "layout.obj",
     "linkage.obj",
@@ -45,6 +45,63 @@ pub const FILES: [&str; 25] = [
     "job.nc",
     "report.json",
     "report.html",
+    "pattern-2.svg",
+    "pattern-2.dxf",
+    "job-2.nc",
+    "pattern-3.svg",
+    "pattern-3.dxf",
+    "job-3.nc",
+    "pattern-4.svg",
+    "pattern-4.dxf",
+    "job-4.nc",
+    "pattern-5.svg",
+    "pattern-5.dxf",
+    "job-5.nc",
+    "pattern-6.svg",
+    "pattern-6.dxf",
+    "job-6.nc",
+    "pattern-7.svg",
+    "pattern-7.dxf",
+    "job-7.nc",
+    "pattern-8.svg",
+    "pattern-8.dxf",
+    "job-8.nc",
+    "pattern-9.svg",
+    "pattern-9.dxf",
+    "job-9.nc",
+    "pattern-10.svg",
+    "pattern-10.dxf",
+    "job-10.nc",
+    "pattern-11.svg",
+    "pattern-11.dxf",
+    "job-11.nc",
+    "pattern-12.svg",
+    "pattern-12.dxf",
+    "job-12.nc",
+    "pattern-13.svg",
+    "pattern-13.dxf",
+    "job-13.nc",
+    "pattern-14.svg",
+    "pattern-14.dxf",
+    "job-14.nc",
+    "pattern-15.svg",
+    "pattern-15.dxf",
+    "job-15.nc",
+    "pattern-16.svg",
+    "pattern-16.dxf",
+    "job-16.nc",
+    "pattern-17.svg",
+    "pattern-17.dxf",
+    "job-17.nc",
+    "pattern-18.svg",
+    "pattern-18.dxf",
+    "job-18.nc",
+    "pattern-19.svg",
+    "pattern-19.dxf",
+    "job-19.nc",
+    "pattern-20.svg",
+    "pattern-20.dxf",
+    "job-20.nc",
     "linkage-2.obj",
     "layout-2.obj",
     "linkage-3.obj",
@@ -62,8 +119,14 @@ pub const FILES: [&str; 25] = [
     "linkage-9.obj",
     "layout-9.obj",
 ];
-/// Those of every sheet; linkage and layout on each further surface follow.
-const OWN_FILES: usize = FILES.len() - 2 * (MOST_SURFACES - 1);
+/// Those of every result; drawing and job of each further sheet follow, then linkage and layout on each further surface.
+const OWN_FILES: usize = 9;
+/// Drawing, twice, and job of each further sheet.
+const FILES_A_SHEET: usize = 3;
+/// Where those of further surfaces begin.
+const SURFACE_FILES: usize = FILES.len() - 2 * (MOST_SURFACES - 1);
+/// Sheets of one result at the most.
+const MOST_SHEETS: usize = 1 + (SURFACE_FILES - OWN_FILES) / FILES_A_SHEET;
 
 /// Everything made, in memory.
 #[derive(Debug)]
@@ -117,16 +180,26 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     }
     let warnings = tell::warnings(&loaded, &material, &shape, stock.sigma);
 
-    // Only a sheet that passes is turned into anything that a machine could run.
-    let mut job = None;
-    if let Some(sheet) = shape.sheet.as_ref().filter(|_| shape.verdict.pass) {
-        let cut = cut(sheet, &machine, &material, &setting, progress)?;
-        shape
-            .verdict
-            .reasons
-            .extend(cut.objections.iter().cloned().map(Reason::from));
+    if shape.sheets.len() > MOST_SHEETS {
+        return Err(MakeError::TooManySheets {
+            sheets: shape.sheets.len(),
+            most: MOST_SHEETS,
+        });
+    }
+
+    // Only sheets that pass are turned into anything that a machine could run, and all of them or none.
+    let mut jobs = Vec::new();
+    if shape.verdict.pass {
+        for sheet in &shape.sheets {
+            let cut = cut(sheet, &machine, &material, &setting, progress)?;
+            let objections = cut.objections.iter().cloned().map(Reason::from);
+            shape.verdict.reasons.extend(objections);
+            jobs.push(cut);
+        }
         shape.verdict.pass = shape.verdict.reasons.is_empty();
-        job = Some(cut).filter(|_| shape.verdict.pass);
+        if !shape.verdict.pass {
+            jobs.clear();
+        }
     }
 
     progress.start("report", None);
@@ -139,19 +212,17 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         shares: &shape.shares,
     };
     let design = decided(request, folder, &loaded, &taken, &stock);
-    let figures = tell::figures(&design, &loaded, &shape, job.as_ref(), &warnings);
-    let summary = tell::summary(
-        &material,
-        &machine,
-        &shape,
-        &targets,
-        job.as_ref(),
-        stock.sigma,
-    );
-    let cut_sheet = || shape.sheet.as_ref().filter(|_| job.is_some());
-    let drawing = cut_sheet().map(pattern::svg);
-    let exchange = cut_sheet().map(pattern::dxf);
-    let strokes = job.as_ref().map(|job| drawn(&job.toolpath));
+    let figures = tell::figures(&design, &loaded, &shape, &jobs, &warnings);
+    let summary = tell::summary(&material, &machine, &shape, &targets, &jobs, stock.sigma);
+    let drawn_sheets: Vec<DrawnSheet> = shape
+        .sheets
+        .iter()
+        .zip(&jobs)
+        .map(|(sheet, job)| DrawnSheet {
+            svg: pattern::svg(sheet),
+            toolpath: drawn(&job.toolpath),
+        })
+        .collect();
     let edge_mm = shape.flat.edge_mm;
     // Of several surfaces each as it was slit, else the one that was mapped, with its own λ.
     let slit: Vec<&Surface> = match &shape.ground.shapes[..] {
@@ -197,8 +268,7 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         poses: &poses,
         distance_limit_in_l: request.accept_distance,
         sigma: stock.sigma,
-        sheet_svg: drawing.as_deref(),
-        toolpath: strokes.as_deref(),
+        sheets: &drawn_sheets,
         figures: &figures,
     };
     let html = report::html(&page);
@@ -222,16 +292,24 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         ("report.json", (report + "\n").into_bytes()),
         ("report.html", html.into_bytes()),
     ];
-    if let (Some(CutResult { gcode, .. }), Some(drawing)) = (job, drawing) {
-        files.push(("pattern.svg", drawing.into_bytes()));
-        files.extend(exchange.map(|text| ("pattern.dxf", text.into_bytes())));
-        files.push(("job.nc", gcode.into_bytes()));
+    let names = [["pattern.svg", "pattern.dxf", "job.nc"]]
+        .into_iter()
+        .chain(
+            FILES[OWN_FILES..SURFACE_FILES]
+                .chunks_exact(FILES_A_SHEET)
+                .map(|c| [c[0], c[1], c[2]]),
+        );
+    let cut = jobs.into_iter().zip(drawn_sheets).zip(&shape.sheets);
+    for (((CutResult { gcode, .. }, drawing), sheet), name) in cut.zip(names) {
+        files.push((name[0], drawing.svg.into_bytes()));
+        files.push((name[1], pattern::dxf(sheet).into_bytes()));
+        files.push((name[2], gcode.into_bytes()));
     }
     // Only a linkage too large for the format has none.
     let opened = write_glb(&shape.linkage, &[&shape.first().positions]);
     files.extend(opened.map(|bytes| ("linkage.glb", bytes)));
     let further = shape.fits.iter().zip(&targets.0).skip(1);
-    for ((fit, target), names) in further.zip(FILES[OWN_FILES..].chunks(2)) {
+    for ((fit, target), names) in further.zip(FILES[SURFACE_FILES..].chunks(2)) {
         files.push((names[0], linkage(fit)));
         files.push((names[1], layout(&target.surface)));
     }
@@ -256,13 +334,38 @@ pub(crate) fn stock<'a>(
 ) -> Result<Stock<'a>, MakeError> {
     let stock = Stock {
         sigma: checked_sigma(request.sigma.unwrap_or(material.sigma.max))?,
-        hinge_width_mm: request.hinge_width_mm.unwrap_or(material.hinge_width_mm),
-        kerf_mm: request.kerf_mm.unwrap_or(setting.kerf_mm),
+        options: SheetOptions {
+            hinge_width_mm: request.hinge_width_mm.unwrap_or(material.hinge_width_mm),
+            kerf_mm: request.kerf_mm.unwrap_or(setting.kerf_mm),
+            tip: request.sheet.tip.unwrap_or_else(|| tip_of(material)),
+            corner_radius_mm: request
+                .sheet
+                .corner_radius_mm
+                .or(material.corner_radius_mm)
+                .unwrap_or(0.0),
+            alignment_hole_mm: request.sheet.alignment_hole_mm,
+        },
         machine,
+        stock_mm: request.sheet.stock_mm,
+        divide: request.sheet.divide,
+        tabs: request.sheet.tabs,
+        tab_width_mm: request.sheet.tab_width_mm,
     };
     check_sizing(request.sizing)?;
     check_ranges(request.accept_distance, &stock)?;
     Ok(stock)
+}
+
+/// The shape of slits' tips that a material's profile asks for.
+fn tip_of(material: &Material) -> Tip {
+    let Some(tip) = material.tip else {
+        return Tip::Plain;
+    };
+    match (tip.shape, tip.radius_mm) {
+        (TipShape::Round, Some(radius_mm)) => Tip::Round { radius_mm },
+        (TipShape::Teardrop, Some(radius_mm)) => Tip::Teardrop { radius_mm },
+        _ => Tip::Plain,
+    }
 }
 
 /// What was decided about the shape of a sheet.
@@ -319,9 +422,25 @@ pub(crate) fn decided(
             material: profile_name(&request.material, folder),
             machine: profile_name(&request.machine, folder),
             sigma: stock.sigma,
-            hinge_width_mm: stock.hinge_width_mm,
-            kerf_mm: stock.kerf_mm,
+            hinge_width_mm: stock.options.hinge_width_mm,
+            kerf_mm: stock.options.kerf_mm,
             mirror: request.mirror,
+            stock_mm: stock.stock_mm,
+            undivided: !stock.divide,
+            tip: match stock.options.tip {
+                Tip::Plain => None,
+                Tip::Round { .. } => Some(TipShape::Round),
+                Tip::Teardrop { .. } => Some(TipShape::Teardrop),
+            },
+            tip_radius_mm: stock.options.tip.radius_mm(0.0),
+            corner_radius_mm: stock.options.corner_radius_mm,
+            alignment_hole_mm: stock.options.alignment_hole_mm,
+            tabs: stock.tabs,
+            tab_width_mm: if stock.tabs > 0 {
+                stock.tab_width_mm
+            } else {
+                0.0
+            },
         },
         linkage: LinkageChoice {
             edge_mm: shape.flat.edge_mm,
@@ -362,15 +481,31 @@ pub(crate) fn checked_sigma(sigma: f64) -> Result<f64, MakeError> {
 }
 
 fn check_ranges(accept_distance: f64, stock: &Stock<'_>) -> Result<(), MakeError> {
+    let area = stock.area();
+    let (width_mm, height_mm) = (area.free.width(), area.free.height());
+    // Two triangles and their hinge.
+    let least_mm = 2.0 * stock.options.hinge_width_mm + 4.0 * stock.options.kerf_mm;
+    if width_mm.min(height_mm) < least_mm {
+        return Err(MakeError::NoStock {
+            width_mm: width_mm.max(0.0),
+            height_mm: height_mm.max(0.0),
+            margin_mm: stock.machine.bed.margin_mm,
+        });
+    }
     for (what, value, least, most) in [
         ("--accept-distance", accept_distance, 0.0, 100.0),
         (
             "the hinge width (--hinge)",
-            stock.hinge_width_mm,
+            stock.options.hinge_width_mm,
             0.01,
             100.0,
         ),
-        ("the width of the cut (--kerf)", stock.kerf_mm, 0.01, 20.0),
+        (
+            "the width of the cut (--kerf)",
+            stock.options.kerf_mm,
+            0.01,
+            20.0,
+        ),
     ] {
         if !(least..=most).contains(&value) {
             return Err(MakeError::Range {

@@ -19,6 +19,7 @@ pub mod report;
 mod request;
 mod several;
 mod shape;
+mod sheets;
 mod states;
 mod targets;
 mod tell;
@@ -36,7 +37,8 @@ pub use linkage_figures::LinkageFigures;
 pub use make::{FILES, Made, make};
 pub use map_figures::{ConeFigures, MapFigures};
 pub use request::{
-    ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, FlapWish, Request, Source,
+    ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, FlapWish, Request,
+    SheetWish, Source, TAB_WIDTH_MM,
 };
 pub use states::{Opening, StateFigures, StateFiles};
 pub use verdict::{COVERAGE_WANTED, EDGE_TOLERANCE, Reason, Verdict};
@@ -49,6 +51,28 @@ use crate::mesh::VertexId;
 /// Why nothing was made.
 #[derive(Debug, thiserror::Error)]
 pub enum MakeError {
+    /// The stock has no room for anything.
+    #[error(
+        "the stock leaves {width_mm} x {height_mm} mm inside margins of {margin_mm} mm: nothing that has a hinge fits. Use larger stock (--stock), or a smaller margin_mm in the machine's profile"
+    )]
+    NoStock {
+        /// Room.
+        width_mm: f64,
+        /// Room.
+        height_mm: f64,
+        /// Margin on each side.
+        margin_mm: f64,
+    },
+    /// The sheet would be divided into more sheets than anybody would cut.
+    #[error(
+        "the sheet fills {sheets} pieces of stock, and {most} is the most: make it smaller (--size, --scale), or use larger stock (--stock) or a larger machine"
+    )]
+    TooManySheets {
+        /// How many it would be.
+        sheets: usize,
+        /// The most.
+        most: usize,
+    },
     /// The mesh file cannot be read.
     #[error("cannot read {path}: {source}")]
     Read {

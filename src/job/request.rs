@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use crate::conformal::Sizing;
 use crate::linkage::Handedness;
 use crate::mesh::ImportOptions;
+use crate::pattern::Tip;
 use crate::rationalize::Solver;
 
 /// Where the surface comes from.
@@ -61,6 +62,42 @@ pub enum FlapWish {
     None,
 }
 
+/// Shapes of what is cut, and the sheets that it is cut from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SheetWish {
+    /// Width and height of a piece of stock in the corner of the bed, millimetres; `None`: as large as the bed.
+    pub stock_mm: Option<[f64; 2]>,
+    /// Divide what does not fit into pieces with flaps.
+    pub divide: bool,
+    /// Shape of the slits' tips, in place of the material's.
+    pub tip: Option<Tip>,
+    /// Radius of the triangles' corners, millimetres, in place of the material's.
+    pub corner_radius_mm: Option<f64>,
+    /// Diameter of the holes in flaps and their doubles, millimetres; 0 for none.
+    pub alignment_hole_mm: f64,
+    /// Tabs that hold each part in the stock.
+    pub tabs: usize,
+    /// Width of each, millimetres.
+    pub tab_width_mm: f64,
+}
+
+impl Default for SheetWish {
+    fn default() -> Self {
+        Self {
+            stock_mm: None,
+            divide: true,
+            tip: None,
+            corner_radius_mm: None,
+            alignment_hole_mm: 0.0,
+            tabs: 0,
+            tab_width_mm: TAB_WIDTH_MM,
+        }
+    }
+}
+
+/// Width of a tab unless told otherwise, millimetres: broken by hand in leather and ply.
+pub const TAB_WIDTH_MM: f64 = 0.5;
+
 /// Everything that `make` needs.
 #[derive(Clone, Debug)]
 pub struct Request {
@@ -84,6 +121,8 @@ pub struct Request {
     pub kerf_mm: Option<f64>,
     /// Cut from the back.
     pub mirror: bool,
+    /// Shapes and sheets.
+    pub sheet: SheetWish,
     /// Triangle size.
     pub sizing: Sizing,
     /// Cones.
@@ -138,6 +177,7 @@ impl Request {
             hinge_width_mm: None,
             kerf_mm: None,
             mirror: false,
+            sheet: SheetWish::default(),
             sizing: Sizing::Triangles(DEFAULT_TRIANGLES),
             cones: ConeWish::Auto,
             darts: DartWish::Auto,

@@ -9,30 +9,36 @@ use std::sync::Arc;
 use nalgebra::{Point2, Point3};
 
 use super::MakeError;
-use super::make::title;
 use super::maps::{Ground, Map};
-use super::request::{ConeWish, FlapWish, Request};
+use super::request::{ConeWish, Request};
+use super::sheets::Sheets;
 use super::targets::{Shaped, Targets};
 use super::verdict::{Verdict, place};
 use crate::base::progress::Progress;
 use crate::base::units::short;
 use crate::conformal::{FlattenOptions, Flattened, Layout, Sizing};
-use crate::linkage::{Built, Flaps, Linkage, LinkageOptions, build_without, fit};
+use crate::linkage::{Built, Flaps, Linkage, LinkageOptions, TriangleId, build_without, fit};
 use crate::machine::Machine;
 use crate::mesh::Surface;
-use crate::pattern::{self, PatternError, Sheet, SheetOptions};
+use crate::pattern::{Sheet, SheetOptions};
 use crate::rationalize::{Effort, Quality, STAGE_COUNT, failing, rationalize};
 
 /// What the sheet is to be, whatever its shape.
 pub(crate) struct Stock<'a> {
     /// Largest scale factor.
     pub sigma: f64,
-    /// Ligament width, millimetres.
-    pub hinge_width_mm: f64,
-    /// Width of the cut, millimetres.
-    pub kerf_mm: f64,
+    /// Hinge width, kerf and shapes.
+    pub options: SheetOptions,
     /// Whose bed it must fit.
     pub machine: &'a Machine,
+    /// A piece of stock in the bed's corner, millimetres; `None`: as large as the bed.
+    pub stock_mm: Option<[f64; 2]>,
+    /// Divide what does not fit.
+    pub divide: bool,
+    /// Tabs for each part.
+    pub tabs: usize,
+    /// Width of each, millimetres.
+    pub tab_width_mm: f64,
 }
 
 /// A linkage solved and judged, and its sheet.
@@ -55,8 +61,10 @@ pub(crate) struct Shape {
     pub flaps: Flaps,
     /// True if the sheet fits the bed only without the doubled rows that it should have.
     pub flaps_too_large: bool,
-    /// The sheet in its place on the bed; none if triangles lie on one another.
-    pub sheet: Option<Sheet>,
+    /// True if the sheet was divided because it does not fit as one.
+    pub divided: bool,
+    /// The sheets, each in its place on the bed; none if triangles lie on one another.
+    pub sheets: Vec<Sheet>,
     /// The linkage with its flat positions there.
     pub linkage: Linkage,
     /// The layout's corners there, by face.
@@ -203,45 +211,22 @@ fn solve(
         ..
     } = laid;
     // The sheet depends on flat positions only: what does not fit the bed is known before the long solve.
-    let (mut sheet, mut motion) = (None, None);
-    let mut flaps = match request.flaps {
-        FlapWish::Auto => built.flaps.clone(),
-        FlapWish::None => built.flaps.none(),
-    };
-    let mut flaps_too_large = false;
-    if built.overlaps.is_empty() {
-        let draw = |flaps: &Flaps| {
-            let options = SheetOptions::plain(stock.hinge_width_mm, stock.kerf_mm);
-            let mut drawn = Sheet::with_flaps(&built.linkage, flaps, &options)?;
-            let told = pattern::MarkOptions {
-                name: &title(&request.source),
-                back: request.mirror,
-            };
-            drawn.marks = pattern::marks(&built.linkage, &drawn, &told);
-            pattern::placed(&drawn, stock.machine, request.mirror)
-        };
-        let mut drawn = draw(&flaps);
-        if matches!(drawn, Err(PatternError::TooLarge { .. })) && !flaps.flaps.is_empty() {
-            let without = flaps.none();
-            drawn = draw(&without);
-            (flaps, flaps_too_large) = (without, true);
-        }
-        let (placed, how) = drawn.map_err(MakeError::Pattern)?;
-        (sheet, motion) = (Some(placed), Some(how));
+    let sheets = Sheets::lay(built, request, stock)?;
+    let mut linkage = sheets.built.linkage.clone();
+    for (n, triangle) in linkage.triangles.iter_mut().enumerate() {
+        let id = TriangleId(n as u32);
+        triangle.flat = triangle.flat.map(|p| sheets.place(id, p));
     }
-    let moved = |p: Point2<f64>| match &motion {
+    // A layout of which the pieces lie here and there has no place of its own.
+    let moved = |p: Point2<f64>| match sheets.motion() {
         Some(motion) => {
             let (x, y) = motion.apply(p.x, p.y);
             Point2::new(x, y)
         }
         None => p,
     };
-    let mut linkage = built.linkage.clone();
-    linkage
-        .triangles
-        .iter_mut()
-        .for_each(|t| t.flat = t.flat.map(moved));
     let chart = flat.layout.corners.iter().map(|c| c.map(moved)).collect();
+    let built = &sheets.built;
 
     let mut fits = Vec::with_capacity(targets.0.len());
     let mut verdict = Verdict::default();
@@ -289,14 +274,15 @@ fn solve(
     Ok(Shape {
         ground: Arc::clone(&ground),
         flat,
-        built,
         removed: map.removal,
         left_out: left_out.to_vec(),
         orientation_deg,
         distortion,
-        flaps,
-        flaps_too_large,
-        sheet,
+        built: sheets.built,
+        flaps: sheets.flaps,
+        flaps_too_large: sheets.flaps_too_large,
+        divided: sheets.divided,
+        sheets: sheets.sheets,
         linkage,
         chart,
         fits,

@@ -14,7 +14,7 @@ use crate::conformal::Dart;
 use crate::machine::Machine;
 use crate::material::{Material, Source as SigmaSource};
 use crate::mesh::VertexId;
-use crate::pattern::Sheet;
+use crate::pattern::{Figures, Sheet};
 
 /// What does not forbid the cut but should be known before it.
 pub(crate) fn warnings(
@@ -87,7 +87,16 @@ pub(crate) fn warnings(
     if let Some(darts) = darts_in_words(&shape.ground) {
         warnings.push(darts);
     }
-    if built.pieces > 1 {
+    if shape.divided {
+        warnings.push(format!(
+            "the sheet is larger than the stock and was divided along lattice lines into {} pieces on {}: join them along their seams",
+            built.pieces,
+            match shape.sheets.len() {
+                1 => "one sheet".into(),
+                n => format!("{n} sheets"),
+            }
+        ));
+    } else if built.pieces > 1 {
         warnings.push(format!(
             "the sheet is cut in {} pieces, because around a cone of negative curvature there is more than lies flat: join them along their seams",
             built.pieces
@@ -160,7 +169,7 @@ pub(crate) fn summary(
     machine: &Machine,
     shape: &Shape,
     targets: &Targets,
-    cut: Option<&CutResult>,
+    cuts: &[CutResult],
     sigma: f64,
 ) -> Vec<(String, String)> {
     let flat = &shape.flat;
@@ -168,16 +177,25 @@ pub(crate) fn summary(
         ("Material".to_owned(), material.title.clone()),
         ("Machine".to_owned(), machine.title.clone()),
     ];
-    if let Some(sheet) = &shape.sheet {
+    for (n, sheet) in shape.sheets.iter().enumerate() {
         let figures = sheet.figures();
+        let name = match shape.sheets.len() {
+            1 => "Sheet".to_owned(),
+            _ => format!("Sheet {}", n + 1),
+        };
         lines.push((
-            "Sheet".to_owned(),
+            name,
             format!(
-                "{} × {} mm",
+                "{} × {} mm, {} cm² of material used{}",
                 short(figures.width_mm, 0),
-                short(figures.height_mm, 0)
+                short(figures.height_mm, 0),
+                short(figures.area_mm2 / 100.0, 0),
+                cost(material, figures.width_mm * figures.height_mm),
             ),
         ));
+    }
+    if let Some(sheet) = shape.sheets.first() {
+        let figures = total(&shape.sheets);
         lines.push((
             "Pattern".to_owned(),
             format!(
@@ -222,9 +240,13 @@ pub(crate) fn summary(
             ),
         ]);
     }
-    if let Some(cut) = cut {
+    for (n, cut) in cuts.iter().enumerate() {
+        let name = match cuts.len() {
+            1 => "Job".to_owned(),
+            _ => format!("Job {}", n + 1),
+        };
         lines.push((
-            "Job".to_owned(),
+            name,
             format!(
                 "{} strokes, {} m cut, {} m travel, {} on the simulated machine",
                 cut.toolpath.cuts.len(),
@@ -235,6 +257,36 @@ pub(crate) fn summary(
         ));
     }
     lines
+}
+
+/// What the box around a sheet costs, if the material's profile has a price.
+fn cost(material: &Material, box_mm2: f64) -> String {
+    let (Some(price), Some(currency)) = (material.price_per_m2, &material.currency) else {
+        return String::new();
+    };
+    format!(
+        ", {} {currency} with its offcut",
+        short(price * box_mm2 * 1e-6, 2)
+    )
+}
+
+/// Counts and lengths of several sheets together; width and height are the largest.
+fn total(sheets: &[Sheet]) -> Figures {
+    let mut sum = Figures::default();
+    for figures in sheets.iter().map(Sheet::figures) {
+        sum.triangles += figures.triangles;
+        sum.flaps += figures.flaps;
+        sum.slits += figures.slits;
+        sum.flap_slits += figures.flap_slits;
+        sum.stars += figures.stars;
+        sum.contours += figures.contours;
+        sum.slit_length_mm += figures.slit_length_mm;
+        sum.contour_length_mm += figures.contour_length_mm;
+        sum.area_mm2 += figures.area_mm2;
+        sum.width_mm = sum.width_mm.max(figures.width_mm);
+        sum.height_mm = sum.height_mm.max(figures.height_mm);
+    }
+    sum
 }
 
 /// Seconds as minutes and seconds.
@@ -252,7 +304,7 @@ pub(crate) fn figures(
     design: &Design,
     loaded: &Loaded,
     shape: &Shape,
-    cut: Option<&CutResult>,
+    cuts: &[CutResult],
     warnings: &[String],
 ) -> Value {
     let (flat, built) = (&shape.flat, &shape.built);
@@ -268,7 +320,8 @@ pub(crate) fn figures(
             .copied()
             .unwrap_or(1.0)
     };
-    let sheet = shape.sheet.as_ref().map(Sheet::figures);
+    let sheets: Vec<_> = shape.sheets.iter().map(Sheet::figures).collect();
+    let sheet = (!sheets.is_empty()).then(|| total(&shape.sheets));
     let first = shape.first();
     let mut figures = json!({
         "verdict": shape.verdict,
@@ -333,8 +386,12 @@ pub(crate) fn figures(
             "width_mm": s.width_mm,
             "height_mm": s.height_mm,
         })),
-        "job": cut.map(CutResult::figures),
+        "job": cuts.first().map(CutResult::figures),
     });
+    if cuts.len() > 1 {
+        figures["sheets"] = json!(sheets);
+        figures["jobs"] = Value::Array(cuts.iter().map(CutResult::figures).collect());
+    }
     if !loaded.also.is_empty() {
         let further = shape.fits.iter().skip(1).zip(&loaded.also);
         let further = further.map(|(fit, also)| {

@@ -171,7 +171,7 @@ impl SeamGuide {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::super::{Built, Handedness, LinkageOptions, build_without, fit};
     use super::*;
     use crate::base::progress::Silent;
@@ -179,7 +179,7 @@ mod tests {
     use crate::mesh::Sample;
 
     /// A vase flattened as a tube, for a seam from rim to rim that may be anywhere.
-    fn vase() -> (Surface, Layout, LinkageOptions) {
+    pub(crate) fn vase() -> (Surface, Layout, LinkageOptions) {
         let surface = Sample::parse("vase:faces=4000").unwrap();
         let surface = surface.generate().unwrap();
         let options = FlattenOptions {

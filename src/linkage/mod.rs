@@ -12,6 +12,8 @@ mod continuity;
 mod flaps;
 mod gltf;
 mod guide;
+#[cfg(test)]
+pub(crate) use guide::tests::vase as vase_with_lattice;
 mod lattice;
 mod lift;
 mod net;
@@ -20,6 +22,7 @@ mod orientation;
 mod pieces;
 mod read;
 mod seam;
+mod split;
 mod types;
 mod walk;
 

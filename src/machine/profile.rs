@@ -2,59 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::controller::{Controller, ControllerLimits};
+use super::lines::{self, Where};
+use super::tool::{LaserTool, PlasmaTool, Tool};
 use crate::base::document::{Complaint, ranged};
-use crate::material::Laser;
 use crate::material::{check_format, check_name};
-
-/// The firmware that reads the G-code.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Controller {
-    /// GRBL 1.1 in laser mode (`$32=1`).
-    Grbl,
-}
-
-impl Controller {
-    /// Longest line that the controller takes, characters without the line end. GRBL 1.1 answers `error:11` to more.
-    pub fn line_limit(self) -> usize {
-        match self {
-            Self::Grbl => 79,
-        }
-    }
-}
-
-/// How the beam follows the motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum PowerMode {
-    /// M4: power follows speed, and the beam is off whenever the machine stands still, also when the link is lost.
-    Dynamic,
-    /// M3: the beam stays on where the machine stops. If the cable is pulled, no program can switch it off.
-    Constant,
-}
-
-/// The laser: `[laser]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LaserTool {
-    /// Its kind.
-    pub kind: Laser,
-    /// Optical power at 100 %, watts.
-    pub watts: f64,
-    /// The S word of 100 % (`$30`).
-    pub s_max: f64,
-    /// M4 or M3.
-    pub power_mode: PowerMode,
-    /// `power_mode = "constant"` needs this to be true: with M3 the beam stays on if the link is lost in mid-job.
-    #[serde(default)]
-    pub accept_beam_on_after_lost_link: bool,
-    /// The line that starts the air, if there is any.
-    #[serde(default)]
-    pub air_on: Option<String>,
-    /// The line that stops the air.
-    #[serde(default)]
-    pub air_off: Option<String>,
-}
 
 /// The corner of the bed where X and Y are zero, seen by a person in front of the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -106,7 +58,7 @@ pub struct Motion {
     pub junction_deviation_mm: f64,
 }
 
-/// How it is reached: `[connection]`.
+/// How a streamed controller is reached: `[connection]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Connection {
@@ -164,14 +116,22 @@ pub struct Machine {
     pub title: String,
     /// Its firmware.
     pub controller: Controller,
-    /// Its laser.
-    pub laser: LaserTool,
+    /// What its controller takes that others of its kind do not, or the reverse.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub controller_limits: Option<ControllerLimits>,
+    /// Its laser; a machine has this or [`Machine::plasma`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub laser: Option<LaserTool>,
+    /// Its plasma torch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plasma: Option<PlasmaTool>,
     /// Its bed.
     pub bed: Bed,
     /// How it moves.
     pub motion: Motion,
-    /// How it is reached.
-    pub connection: Connection,
+    /// How it is reached; none for a controller that opens jobs as files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub connection: Option<Connection>,
     /// Homing.
     pub homing: Homing,
     /// What stands around every job.
@@ -195,6 +155,54 @@ impl Reach {
 }
 
 impl Machine {
+    /// What cuts; `None` only for a machine that would not pass [`Machine::validate`].
+    pub fn tool(&self) -> Option<Tool<'_>> {
+        match (&self.laser, &self.plasma) {
+            (Some(laser), _) => Some(Tool::Laser(laser)),
+            (None, Some(plasma)) => Some(Tool::Plasma(plasma)),
+            (None, None) => None,
+        }
+    }
+
+    /// Its laser, if it has one.
+    pub fn laser(&self) -> Option<&LaserTool> {
+        self.laser.as_ref()
+    }
+
+    /// Its plasma torch, if it has one.
+    pub fn plasma(&self) -> Option<&PlasmaTool> {
+        self.plasma.as_ref()
+    }
+
+    /// Longest line that its controller takes, characters without the line end.
+    pub fn line_limit(&self) -> usize {
+        self.controller_limits
+            .as_ref()
+            .and_then(|l| l.line_limit)
+            .map_or(self.controller.line_limit(), |l| l as usize)
+    }
+
+    /// Whether its controller takes arcs.
+    pub fn arcs(&self) -> bool {
+        self.controller_limits
+            .as_ref()
+            .and_then(|l| l.arcs)
+            .unwrap_or(self.controller.arcs())
+    }
+
+    /// Short lines that its controller takes in a second.
+    pub fn lines_per_s(&self) -> f64 {
+        self.controller_limits
+            .as_ref()
+            .and_then(|l| l.lines_per_s)
+            .unwrap_or(self.controller.lines_per_s())
+    }
+
+    /// The shortest segment that its planner can be fed at this speed, millimetres: shorter ones make it starve.
+    pub fn shortest_segment_mm(&self, feed_mm_per_min: f64) -> f64 {
+        feed_mm_per_min / 60.0 / self.lines_per_s()
+    }
+
     /// Where the beam may go.
     pub fn reach(&self) -> Reach {
         let (w, h) = (self.bed.width_mm, self.bed.height_mm);
@@ -222,7 +230,10 @@ impl Machine {
     pub fn validate(&self) -> Result<(), Complaint> {
         check_format(self.format)?;
         check_name(&self.name)?;
-        self.check_laser()?;
+        if let Some(limits) = &self.controller_limits {
+            limits.check(self.controller)?;
+        }
+        self.check_tool()?;
         self.check_bed()?;
         self.check_motion()?;
         self.check_connection()?;
@@ -230,18 +241,20 @@ impl Machine {
         self.check_lines()
     }
 
-    fn check_laser(&self) -> Result<(), Complaint> {
-        ranged("laser.watts", self.laser.watts, 0.1, 50_000.0)?;
-        ranged("laser.s_max", self.laser.s_max, 1.0, 100_000.0)?;
-        if self.laser.power_mode == PowerMode::Constant
-            && !self.laser.accept_beam_on_after_lost_link
-        {
-            return Err(Complaint::new(
-                "laser.power_mode",
-                "is \"constant\" (M3): if the cable is pulled in mid-job the beam stays on, and no program can switch it off. Use \"dynamic\" (M4), or write accept_beam_on_after_lost_link = true below it",
-            ));
+    fn check_tool(&self) -> Result<(), Complaint> {
+        let limit = self.line_limit();
+        match (&self.laser, &self.plasma) {
+            (Some(laser), None) => laser.check(self.controller, limit),
+            (None, Some(plasma)) => plasma.check(self.controller, limit),
+            (Some(_), Some(_)) => Err(Complaint::new(
+                "plasma",
+                "stands beside [laser]: one machine has one tool. Write a profile for each",
+            )),
+            (None, None) => Err(Complaint::new(
+                "controller",
+                "stands in a profile without a tool: add a [laser] or a [plasma] table",
+            )),
         }
-        Ok(())
     }
 
     fn check_bed(&self) -> Result<(), Complaint> {
@@ -286,10 +299,27 @@ impl Machine {
     }
 
     fn check_connection(&self) -> Result<(), Complaint> {
-        let c = &self.connection;
+        let Some(c) = &self.connection else {
+            if self.controller.is_streamed() {
+                return Err(Complaint::new(
+                    "controller",
+                    format!(
+                        "is {}, to which jobs are streamed: add a [connection] table",
+                        self.controller
+                    ),
+                ));
+            }
+            return Ok(());
+        };
+        if !self.controller.is_streamed() {
+            return Err(Complaint::new(
+                "connection",
+                format!("is of no use: {} opens jobs as files", self.controller),
+            ));
+        }
         ranged("connection.baud", f64::from(c.baud), 300.0, 10_000_000.0)?;
         // A buffer that does not hold one full line could never be streamed to.
-        let least = self.controller.line_limit() as f64 + 1.0;
+        let least = self.line_limit() as f64 + 1.0;
         ranged(
             "connection.receive_buffer_bytes",
             f64::from(c.receive_buffer_bytes),
@@ -321,47 +351,18 @@ impl Machine {
     }
 
     fn check_lines(&self) -> Result<(), Complaint> {
-        let job = [
-            ("job.preamble", &self.job.preamble),
-            ("job.postamble", &self.job.postamble),
-        ];
-        for (key, lines) in job {
-            for (i, line) in lines.iter().enumerate() {
-                self.check_line(&format!("{key}[{i}]"), line)?;
-            }
+        let limit = self.line_limit();
+        for (i, line) in self.job.preamble.iter().enumerate() {
+            let key = format!("job.preamble[{i}]");
+            lines::check(&key, line, self.controller, limit, Where::Preamble)?;
         }
-        for (key, line) in [
-            ("laser.air_on", &self.laser.air_on),
-            ("laser.air_off", &self.laser.air_off),
-        ] {
-            if let Some(line) = line {
-                self.check_line(key, line)?;
-            }
-        }
-        Ok(())
-    }
-
-    fn check_line(&self, key: &str, line: &str) -> Result<(), Complaint> {
-        let limit = self.controller.line_limit();
-        if line.len() > limit {
-            let problem = format!(
-                "has {} characters; the controller takes {limit} in a line",
-                line.len()
-            );
-            return Err(Complaint::new(key, problem));
-        }
-        if line.trim().is_empty() {
-            return Err(Complaint::new(key, "is an empty line"));
-        }
-        // `?`, `!` and `~` act at once wherever they stand, also in a comment.
-        if let Some(c) = line
-            .chars()
-            .find(|c| !(' '..='}').contains(c) || "?!".contains(*c))
-        {
-            return Err(Complaint::new(
-                key,
-                format!("has the character {c:?}, which a line of G-code must not hold"),
-            ));
+        let count = self.job.postamble.len();
+        for (i, line) in self.job.postamble.iter().enumerate() {
+            let place = Where::Postamble {
+                last: i + 1 == count,
+            };
+            let key = format!("job.postamble[{i}]");
+            lines::check(&key, line, self.controller, limit, place)?;
         }
         Ok(())
     }

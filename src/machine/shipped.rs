@@ -13,11 +13,31 @@ const SHIPPED: &[(&str, &str)] = &[
         "co2-600x400",
         include_str!("../../machines/co2-600x400.toml"),
     ),
+    (
+        "co2-900x600-grblhal",
+        include_str!("../../machines/co2-900x600-grblhal.toml"),
+    ),
     ("diode-400", include_str!("../../machines/diode-400.toml")),
+    (
+        "diode-400-fluidnc",
+        include_str!("../../machines/diode-400-fluidnc.toml"),
+    ),
     ("fibre-300", include_str!("../../machines/fibre-300.toml")),
+    (
+        "plasma-generic",
+        include_str!("../../machines/plasma-generic.toml"),
+    ),
+    (
+        "plasma-linuxcnc",
+        include_str!("../../machines/plasma-linuxcnc.toml"),
+    ),
+    (
+        "plasma-qtplasmac",
+        include_str!("../../machines/plasma-qtplasmac.toml"),
+    ),
 ];
 
-const CATALOG: Catalog = Catalog {
+pub(super) const CATALOG: Catalog = Catalog {
     kind: "machine",
     shipped: SHIPPED,
 };
@@ -142,6 +162,24 @@ mod tests {
                 "laser.air_on",
             ),
             ("controller = \"grbl\"", "controller = \"marlin\"", ""),
+            (
+                "controller = \"grbl\"",
+                "controller = \"linuxcnc\"",
+                "laser",
+            ),
+            (
+                "[laser]",
+                "[controller_limits]\nline_limit = 80\n[laser]",
+                "controller_limits.line_limit",
+            ),
+            (
+                "[laser]",
+                "[controller_limits]\nlines_per_s = nan\n[laser]",
+                "controller_limits.lines_per_s",
+            ),
+            ("\"M8\"", "\"M3 S5\"", "laser.air_on"),
+            ("\"G54\"", "\"G54\", \"G0 X5\"", "job.preamble[1]"),
+            ("\"M2\"", "\"M2\", \"M4\"", "job.postamble[0]"),
             ("homing", "hooming", ""),
         ] {
             assert!(good.contains(from), "the fixture changed: {from}");
@@ -155,5 +193,133 @@ mod tests {
             1,
         );
         assert!(parse("x.toml", &accepted).is_ok());
+    }
+
+    #[test]
+    fn each_check_of_a_torch_has_a_text_that_fails_it() {
+        for (name, from, to, key) in [
+            (
+                "plasma-qtplasmac",
+                "\"linuxcnc\"",
+                "\"generic\"",
+                "plasma.height_control",
+            ),
+            (
+                "plasma-qtplasmac",
+                "\"qtplasmac\"",
+                "\"plain\"",
+                "plasma.scribe",
+            ),
+            (
+                "plasma-qtplasmac",
+                "max_amps = 45",
+                "max_amps = nan",
+                "plasma.max_amps",
+            ),
+            (
+                "plasma-qtplasmac",
+                "percent = 60",
+                "percent = 5",
+                "plasma.corner.percent",
+            ),
+            (
+                "plasma-qtplasmac",
+                "distance_mm = 3",
+                "distance_mm = 0",
+                "plasma.corner.distance_mm",
+            ),
+            (
+                "plasma-qtplasmac",
+                "angle_deg = 60",
+                "angle_deg = 181",
+                "plasma.corner.angle_deg",
+            ),
+            (
+                "plasma-qtplasmac",
+                "[homing]",
+                "[connection]\nbaud = 9600\nreceive_buffer_bytes = 300\nplanner_blocks = 9\nreset_on_open = false\n[homing]",
+                "connection",
+            ),
+            (
+                "plasma-qtplasmac",
+                "controller = \"linuxcnc\"",
+                "controller = \"grbl\"",
+                "plasma.height_control",
+            ),
+            ("plasma-linuxcnc", "\"linuxcnc\"", "\"grbl\"", "controller"),
+            (
+                "plasma-linuxcnc",
+                "safe_height_mm = 20\n",
+                "",
+                "plasma.safe_height_mm",
+            ),
+            (
+                "plasma-linuxcnc",
+                "safe_height_mm = 20",
+                "safe_height_mm = -1",
+                "plasma.safe_height_mm",
+            ),
+            (
+                "plasma-linuxcnc",
+                "{pierce_height_mm}",
+                "{height}",
+                "plasma.template.begin_cut[2]",
+            ),
+            (
+                "plasma-linuxcnc",
+                "{pierce_height_mm}",
+                "{pierce_height_mm",
+                "plasma.template.begin_cut[2]",
+            ),
+            (
+                "plasma-linuxcnc",
+                "\"M3 S1\"",
+                "\"M7\"",
+                "plasma.template.begin_cut",
+            ),
+            (
+                "plasma-linuxcnc",
+                "\"M5\"",
+                "\"M9\"",
+                "plasma.template.end_cut",
+            ),
+            (
+                "plasma-linuxcnc",
+                "\"G92 Z0\"",
+                "\"G92 X0\"",
+                "plasma.template.begin_cut[1]",
+            ),
+            (
+                "plasma-linuxcnc",
+                "\"G92 Z0\"",
+                "\"G91\"",
+                "plasma.template.begin_cut",
+            ),
+            (
+                "plasma-generic",
+                "line_limit = 100",
+                "line_limit = 20",
+                "controller_limits.line_limit",
+            ),
+            (
+                "plasma-generic",
+                "[plasma]",
+                "[laser]\nkind = \"co2\"\nwatts = 1\ns_max = 1\npower_mode = \"dynamic\"\n[plasma]",
+                "plasma",
+            ),
+        ] {
+            let (_, good) = shipped().find(|(n, _)| *n == name).unwrap();
+            assert!(good.contains(from), "the fixture changed: {from}");
+            let error = parse("x.toml", &good.replacen(from, to, 1)).unwrap_err();
+            assert!(error.line.is_some(), "{from}: {error}");
+            assert_eq!(error.key.as_deref().unwrap_or(""), key, "{error}");
+        }
+        let (_, good) = shipped().find(|(n, _)| *n == "plasma-qtplasmac").unwrap();
+        let (start, end) = (good.find("[plasma]").unwrap(), good.find("[bed]").unwrap());
+        let without = format!("{}{}", &good[..start], &good[end..]);
+        assert_eq!(
+            parse("x", &without).unwrap_err().key.as_deref(),
+            Some("controller")
+        );
     }
 }

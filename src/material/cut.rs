@@ -1,11 +1,9 @@
-//! Settings that cut a material, and the choice of the right ones for a machine.
+//! Settings that cut and mark a material, as its profile holds them.
 
 use serde::{Deserialize, Serialize};
 
-use super::profile::{Material, Source};
+use super::profile::{Source, check_note};
 use crate::base::document::{Complaint, ranged};
-use crate::base::units::short;
-use crate::machine::Machine;
 
 /// How material is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -13,6 +11,17 @@ use crate::machine::Machine;
 pub enum Process {
     /// A laser beam.
     Laser,
+    /// A plasma arc.
+    Plasma,
+}
+
+impl std::fmt::Display for Process {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Laser => "laser",
+            Self::Plasma => "plasma",
+        })
+    }
 }
 
 /// The kind of laser: its wavelength decides what it cuts.
@@ -27,6 +36,17 @@ pub enum Laser {
     Fibre,
 }
 
+impl Laser {
+    /// As profiles spell it.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Co2 => "co2",
+            Self::Diode => "diode",
+            Self::Fibre => "fibre",
+        }
+    }
+}
+
 impl std::fmt::Display for Laser {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
@@ -37,230 +57,260 @@ impl std::fmt::Display for Laser {
     }
 }
 
-/// One way to cut a material: one `[[cut]]` of its profile.
+/// In which order the passes of a job with several are made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PassOrder {
+    /// All passes of a cut, then the next cut: less travel.
+    #[default]
+    Cut,
+    /// One pass of the whole sheet, then the next: cooler.
+    Sheet,
+}
+
+/// One way to cut a material: one `[[cut]]` of its profile. Keys of the other process are refused by
+/// [`super::Material::validate`]; what a key left out means, [`super::CutSetting`] says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct CutSetting {
+pub struct CutEntry {
     /// How material is removed.
     pub process: Process,
-    /// With which kind of laser.
-    pub laser: Laser,
-    /// Optical power of the laser that these settings are for, watts.
-    pub watts: f64,
+    /// Laser: its kind.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub laser: Option<Laser>,
+    /// Laser: optical power of the laser that these settings are for, watts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub watts: Option<f64>,
+    /// Laser: power, per cent of `watts`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub power_percent: Option<f64>,
+    /// Laser: how often each cut is gone over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub passes: Option<u32>,
+    /// Laser: in which order.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pass_order: Option<PassOrder>,
+    /// Laser: whether air must blow at the cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub air_assist: Option<bool>,
+    /// Plasma: current, amperes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub amps: Option<f64>,
+    /// Plasma: how long the torch stands until it is through, seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pierce_delay_s: Option<f64>,
+    /// Plasma: its height meanwhile, millimetres over the sheet.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pierce_height_mm: Option<f64>,
+    /// Plasma: its height while cutting, millimetres over the sheet.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cut_height_mm: Option<f64>,
     /// Speed along the cut, millimetres per minute.
     pub speed_mm_per_min: f64,
-    /// Power, per cent of `watts`.
-    pub power_percent: f64,
-    /// How often each cut is gone over.
-    pub passes: u32,
-    /// Whether air must blow at the cut.
-    pub air_assist: bool,
     /// Width of what is burnt away, millimetres.
     pub kerf_mm: f64,
+    /// Diameter of the hole where a cut begins, millimetres. Laser: the kerf if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pierce_diameter_mm: Option<f64>,
+    /// Length of the way from the pierce into the cut, millimetres; 0 if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lead_in_mm: Option<f64>,
+    /// Length of the way out of it, millimetres; 0 if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lead_out_mm: Option<f64>,
+    /// How far a closed cut goes on past its beginning, millimetres; 0 if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub overcut_mm: Option<f64>,
     /// Where the figures come from.
     pub source: Source,
     /// From whom or how, in words.
     pub note: String,
 }
 
-impl CutSetting {
-    pub(super) fn check(&self, at: usize) -> Result<(), Complaint> {
-        let key = |k: &str| format!("cut[{at}].{k}");
-        ranged(&key("watts"), self.watts, 0.1, 50_000.0)?;
+/// One way to mark a material: one `[[engrave]]` of its profile.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EngraveEntry {
+    /// With a laser, or with the scribe of a plasma table.
+    pub process: Process,
+    /// Laser: its kind.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub laser: Option<Laser>,
+    /// Laser: optical power of the laser that these settings are for, watts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub watts: Option<f64>,
+    /// Laser: power, per cent of `watts`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub power_percent: Option<f64>,
+    /// Speed, millimetres per minute.
+    pub speed_mm_per_min: f64,
+    /// Where the figures come from.
+    pub source: Source,
+    /// From whom or how, in words.
+    pub note: String,
+}
+
+/// A key with whether it is there, and whether the process must have it, may have it, or must not.
+type Rule = (&'static str, bool, Need);
+
+#[derive(Clone, Copy, PartialEq)]
+enum Need {
+    Must,
+    May,
+    Never,
+}
+
+fn check_keys(at: &str, process: Process, rules: &[Rule]) -> Result<(), Complaint> {
+    for &(key, present, need) in rules {
+        let full = format!("{at}.{key}");
+        if present && need == Need::Never {
+            return Err(Complaint::new(
+                full,
+                format!("has no meaning with process = \"{process}\"; remove it"),
+            ));
+        }
+        if !present && need == Need::Must {
+            return Err(Complaint::new(
+                full,
+                format!("is missing; process = \"{process}\" needs it"),
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn ranged_if(key: &str, value: Option<f64>, low: f64, high: f64) -> Result<(), Complaint> {
+    value.map_or(Ok(()), |v| ranged(key, v, low, high))
+}
+
+impl CutEntry {
+    /// What it is for, in words: `CO2 40 W`, `plasma 20 A`.
+    pub fn tool(&self) -> String {
+        tool(self.laser, self.watts, self.amps)
+    }
+
+    /// What decides between settings of one kind: watts that arrive, or amperes.
+    pub(super) fn strength(&self) -> f64 {
+        match self.process {
+            Process::Laser => {
+                self.watts.unwrap_or(0.0) * self.power_percent.unwrap_or(100.0) / 100.0
+            }
+            Process::Plasma => self.amps.unwrap_or(0.0),
+        }
+    }
+
+    pub(super) fn check(&self, i: usize) -> Result<(), Complaint> {
+        let at = format!("cut[{i}]");
+        let key = |k: &str| format!("{at}.{k}");
+        let (laser, plasma) = match self.process {
+            Process::Laser => (Need::Must, Need::Never),
+            Process::Plasma => (Need::Never, Need::Must),
+        };
+        let laser_may = if laser == Need::Must {
+            Need::May
+        } else {
+            Need::Never
+        };
+        let pierce = if plasma == Need::Must {
+            Need::Must
+        } else {
+            Need::May
+        };
+        check_keys(
+            &at,
+            self.process,
+            &[
+                ("laser", self.laser.is_some(), laser),
+                ("watts", self.watts.is_some(), laser),
+                ("power_percent", self.power_percent.is_some(), laser),
+                ("passes", self.passes.is_some(), laser),
+                ("pass_order", self.pass_order.is_some(), laser_may),
+                ("air_assist", self.air_assist.is_some(), laser),
+                ("amps", self.amps.is_some(), plasma),
+                ("pierce_delay_s", self.pierce_delay_s.is_some(), plasma),
+                ("pierce_height_mm", self.pierce_height_mm.is_some(), plasma),
+                ("cut_height_mm", self.cut_height_mm.is_some(), plasma),
+                (
+                    "pierce_diameter_mm",
+                    self.pierce_diameter_mm.is_some(),
+                    pierce,
+                ),
+            ],
+        )?;
+        ranged_if(&key("watts"), self.watts, 0.1, 50_000.0)?;
+        ranged_if(&key("power_percent"), self.power_percent, 0.1, 100.0)?;
+        ranged_if(&key("passes"), self.passes.map(f64::from), 1.0, 50.0)?;
+        ranged_if(&key("amps"), self.amps, 5.0, 1000.0)?;
+        ranged_if(&key("pierce_delay_s"), self.pierce_delay_s, 0.0, 60.0)?;
+        ranged_if(&key("pierce_height_mm"), self.pierce_height_mm, 0.1, 50.0)?;
+        ranged_if(&key("cut_height_mm"), self.cut_height_mm, 0.1, 50.0)?;
         ranged(
             &key("speed_mm_per_min"),
             self.speed_mm_per_min,
             1.0,
             200_000.0,
         )?;
-        ranged(&key("power_percent"), self.power_percent, 0.1, 100.0)?;
-        ranged(&key("passes"), f64::from(self.passes), 1.0, 50.0)?;
         ranged(&key("kerf_mm"), self.kerf_mm, 0.005, 5.0)?;
-        super::profile::check_note(&key("note"), self.source, &self.note)
+        // A pierce burns at least what the cut burns.
+        ranged_if(
+            &key("pierce_diameter_mm"),
+            self.pierce_diameter_mm,
+            self.kerf_mm,
+            20.0,
+        )?;
+        ranged_if(&key("lead_in_mm"), self.lead_in_mm, 0.0, 50.0)?;
+        ranged_if(&key("lead_out_mm"), self.lead_out_mm, 0.0, 50.0)?;
+        ranged_if(&key("overcut_mm"), self.overcut_mm, 0.0, 50.0)?;
+        check_note(&key("note"), self.source, &self.note)
     }
 }
 
-/// Why a machine does not cut a material.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum CutError {
-    /// The profile has no settings for this kind of laser.
-    #[error(
-        "machine `{machine}` has a {laser} laser, and material `{material}` has settings for: {has}. Choose another machine or material, or add a [[cut]] with laser = \"{key}\" to a copy of the material's profile"
-    )]
-    NoLaser {
-        /// The machine.
-        machine: String,
-        /// Its laser.
-        laser: Laser,
-        /// Its laser as profiles spell it.
-        key: &'static str,
-        /// The material.
-        material: String,
-        /// The lasers that the material has settings for, with their watts.
-        has: String,
-    },
-    /// All settings for this kind of laser need more power.
-    #[error(
-        "material `{material}` needs a {laser} laser of {needs_watts} W (at {needs_percent} %), and machine `{machine}` has {watts} W"
-    )]
-    TooWeak {
-        /// The machine.
-        machine: String,
-        /// Its power, watts.
-        watts: f64,
-        /// Its laser.
-        laser: Laser,
-        /// The material.
-        material: String,
-        /// Power of the weakest laser in the profile, watts.
-        needs_watts: f64,
-        /// Per cent of it that is used.
-        needs_percent: f64,
-    },
-    /// The cut is faster than the machine moves.
-    #[error(
-        "material `{material}` is cut at {speed_mm_per_min} mm/min, and machine `{machine}` moves at {limit_mm_per_min} mm/min at the most: lower the speed and the power in a copy of the material's profile"
-    )]
-    TooFast {
-        /// The machine.
-        machine: String,
-        /// The slower axis's largest rate.
-        limit_mm_per_min: f64,
-        /// The material.
-        material: String,
-        /// The speed of the cut.
-        speed_mm_per_min: f64,
-    },
-    /// The cut wants air and the machine has none.
-    #[error(
-        "material `{material}` is cut with air assist, and machine `{machine}` has none (`laser.air_on`, for example \"M8\")"
-    )]
-    NoAir {
-        /// The machine.
-        machine: String,
-        /// The material.
-        material: String,
-    },
-}
-
-impl Material {
-    /// The settings with which a machine cuts this material.
-    ///
-    /// Among the settings for its kind of laser, those for the strongest one that is no stronger than the machine's;
-    /// on a stronger machine the percentage is lowered so that the same watts arrive.
-    ///
-    /// # Errors
-    /// [`CutError`] says what is missing and what to change.
-    pub fn cut_for(&self, machine: &Machine) -> Result<CutSetting, CutError> {
-        let laser = &machine.laser;
-        let of_kind = || self.cut.iter().filter(|c| c.laser == laser.kind);
-        if of_kind().next().is_none() {
-            return Err(CutError::NoLaser {
-                machine: machine.name.clone(),
-                laser: laser.kind,
-                key: match laser.kind {
-                    Laser::Co2 => "co2",
-                    Laser::Diode => "diode",
-                    Laser::Fibre => "fibre",
-                },
-                material: self.name.clone(),
-                has: self
-                    .cut
-                    .iter()
-                    .map(|c| format!("{} {} W", c.laser, short(c.watts, 3)))
-                    .collect::<Vec<_>>()
-                    .join(", "),
-            });
+impl EngraveEntry {
+    /// What it is for, in words.
+    pub fn tool(&self) -> String {
+        match self.process {
+            Process::Laser => tool(self.laser, self.watts, None),
+            Process::Plasma => "scribe".into(),
         }
-        // What a setting really needs is its watts times its percentage.
-        let needed = |c: &CutSetting| c.watts * c.power_percent / 100.0;
-        let best = of_kind()
-            .filter(|c| needed(c) <= laser.watts)
-            .max_by(|a, b| needed(a).total_cmp(&needed(b)));
-        let Some(best) = best else {
-            let least = of_kind().min_by(|a, b| needed(a).total_cmp(&needed(b)));
-            return Err(CutError::TooWeak {
-                machine: machine.name.clone(),
-                watts: laser.watts,
-                laser: laser.kind,
-                material: self.name.clone(),
-                needs_watts: least.map_or(0.0, |c| c.watts),
-                needs_percent: least.map_or(0.0, |c| c.power_percent),
-            });
+    }
+
+    pub(super) fn strength(&self) -> f64 {
+        self.watts.unwrap_or(0.0) * self.power_percent.unwrap_or(100.0) / 100.0
+    }
+
+    pub(super) fn check(&self, i: usize) -> Result<(), Complaint> {
+        let at = format!("engrave[{i}]");
+        let key = |k: &str| format!("{at}.{k}");
+        let laser = match self.process {
+            Process::Laser => Need::Must,
+            Process::Plasma => Need::Never,
         };
-        let limit = machine
-            .motion
-            .rate_mm_per_min
-            .x
-            .min(machine.motion.rate_mm_per_min.y);
-        if best.speed_mm_per_min > limit {
-            return Err(CutError::TooFast {
-                machine: machine.name.clone(),
-                limit_mm_per_min: limit,
-                material: self.name.clone(),
-                speed_mm_per_min: best.speed_mm_per_min,
-            });
-        }
-        if best.air_assist && laser.air_on.is_none() {
-            return Err(CutError::NoAir {
-                machine: machine.name.clone(),
-                material: self.name.clone(),
-            });
-        }
-        Ok(CutSetting {
-            power_percent: needed(best) / laser.watts * 100.0,
-            watts: laser.watts,
-            ..best.clone()
-        })
+        check_keys(
+            &at,
+            self.process,
+            &[
+                ("laser", self.laser.is_some(), laser),
+                ("watts", self.watts.is_some(), laser),
+                ("power_percent", self.power_percent.is_some(), laser),
+            ],
+        )?;
+        ranged_if(&key("watts"), self.watts, 0.1, 50_000.0)?;
+        ranged_if(&key("power_percent"), self.power_percent, 0.1, 100.0)?;
+        ranged(
+            &key("speed_mm_per_min"),
+            self.speed_mm_per_min,
+            1.0,
+            200_000.0,
+        )?;
+        check_note(&key("note"), self.source, &self.note)
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn pair() -> (Material, Machine) {
-        (
-            crate::material::load("leather-1.6").unwrap(),
-            crate::machine::load("co2-600x400").unwrap(),
-        )
-    }
-
-    #[test]
-    fn a_stronger_laser_gives_the_same_watts() {
-        let (material, mut machine) = pair();
-        let watts = |c: &CutSetting| c.watts * c.power_percent / 100.0;
-        let here = material.cut_for(&machine).unwrap();
-        machine.laser.watts *= 2.0;
-        let strong = material.cut_for(&machine).unwrap();
-        assert!((watts(&here) - watts(&strong)).abs() < 1e-9);
-        assert!((strong.power_percent * 2.0 - here.power_percent).abs() < 1e-9);
-    }
-
-    #[test]
-    fn each_refusal_says_what_is_missing() {
-        let (material, machine) = pair();
-        let mut m = machine.clone();
-        m.laser.kind = Laser::Fibre;
-        let text = material.cut_for(&m).unwrap_err().to_string();
-        assert!(
-            text.contains("fibre laser") && text.contains("CO2 40 W"),
-            "{text}"
-        );
-        let mut m = machine.clone();
-        m.laser.watts = 1.0;
-        assert!(matches!(
-            material.cut_for(&m),
-            Err(CutError::TooWeak { .. })
-        ));
-        let mut m = machine.clone();
-        m.motion.rate_mm_per_min.y = 10.0;
-        assert!(matches!(
-            material.cut_for(&m),
-            Err(CutError::TooFast { .. })
-        ));
-        let mut m = machine;
-        m.laser.air_on = None;
-        assert!(matches!(material.cut_for(&m), Err(CutError::NoAir { .. })));
+fn tool(laser: Option<Laser>, watts: Option<f64>, amps: Option<f64>) -> String {
+    use crate::base::units::short;
+    match (laser, watts, amps) {
+        (Some(laser), Some(watts), _) => format!("{laser} {} W", short(watts, 3)),
+        (_, _, Some(amps)) => format!("plasma {} A", short(amps, 3)),
+        _ => "nothing".into(),
     }
 }

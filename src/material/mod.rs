@@ -1,14 +1,19 @@
 //! Stage 0: what the sheet is made of, and what cuts it.
 //!
 //! A [`Material`] is plain data from `profiles/NAME.toml`: how far it stretches at a hinge (σ), how wide a hinge must
-//! be, and for each kind of laser the settings that cut it and the kerf they leave. Figures say where they come from:
-//! only a [`Source::Measured`] was measured.
+//! be, and for each kind of laser and torch the settings that cut and mark it and the kerf they leave. Figures say
+//! where they come from: only a [`Source::Measured`] was measured. [`Material::cut_for`] gives the settings for one
+//! machine, every default filled in.
 
 mod cut;
+mod fit;
 mod profile;
 mod shipped;
+mod start;
 
-pub use cut::{CutError, CutSetting, Laser, Process};
-pub use profile::{Kind, Material, Sigma, Source};
+pub use cut::{CutEntry, EngraveEntry, Laser, PassOrder, Process};
+pub use fit::{CutError, CutSetting, Fit, MarkSetting, TorchSetting, classify};
+pub use profile::{Kind, Material, Sigma, Source, StockSize, Tip, TipShape};
 pub(crate) use profile::{check_format, check_name};
 pub use shipped::{DEFAULT, load, parse, shipped};
+pub use start::start;

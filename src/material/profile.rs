@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::cut::CutSetting;
+use super::cut::{CutEntry, EngraveEntry, Process};
 use crate::base::document::{Complaint, ranged};
 
 /// What family a material belongs to.
@@ -47,6 +47,40 @@ pub struct Sigma {
     pub note: String,
 }
 
+/// The form of a slit's end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TipShape {
+    /// As the beam leaves it: round, with half the kerf for radius.
+    #[default]
+    Plain,
+    /// A round hole.
+    Round,
+    /// A drop that opens from the slit into a round end.
+    Teardrop,
+}
+
+/// Stress relief at the ends of slits: `[tip]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tip {
+    /// Its form.
+    pub shape: TipShape,
+    /// Radius of the end, millimetres; none for a plain one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius_mm: Option<f64>,
+}
+
+/// Size of the sheets as they are bought: `stock_mm`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StockSize {
+    /// Along X, millimetres.
+    pub x: f64,
+    /// Along Y, millimetres.
+    pub y: f64,
+}
+
 /// A material: the whole of `profiles/NAME.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -63,10 +97,28 @@ pub struct Material {
     pub thickness_mm: f64,
     /// Width h of the narrowest ligament at a hinge, millimetres.
     pub hinge_width_mm: f64,
+    /// Radius of the rounded corners of triangles, millimetres; sharp if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub corner_radius_mm: Option<f64>,
+    /// Size of the sheets as they are bought; as large as the machine's bed if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stock_mm: Option<StockSize>,
+    /// Price of a square metre.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub price_per_m2: Option<f64>,
+    /// In which currency, three letters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub currency: Option<String>,
     /// How far it stretches.
     pub sigma: Sigma,
+    /// Stress relief at the ends of slits; none if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip: Option<Tip>,
     /// The ways to cut it.
-    pub cut: Vec<CutSetting>,
+    pub cut: Vec<CutEntry>,
+    /// The ways to mark it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub engrave: Vec<EngraveEntry>,
 }
 
 /// The version of the profile format that this build reads.
@@ -122,8 +174,76 @@ impl Material {
         check_name(&self.name)?;
         ranged("thickness_mm", self.thickness_mm, 0.01, 50.0)?;
         ranged("hinge_width_mm", self.hinge_width_mm, 0.02, 50.0)?;
+        if let Some(radius) = self.corner_radius_mm {
+            ranged("corner_radius_mm", radius, 0.0, 50.0)?;
+        }
+        self.check_stock()?;
         self.check_sigma()?;
-        self.check_cuts()
+        self.check_tip()?;
+        self.check_cuts()?;
+        self.check_engravings()
+    }
+
+    fn check_stock(&self) -> Result<(), Complaint> {
+        if let Some(stock) = self.stock_mm {
+            ranged("stock_mm.x", stock.x, 10.0, 10_000.0)?;
+            ranged("stock_mm.y", stock.y, 10.0, 10_000.0)?;
+        }
+        if let Some(price) = self.price_per_m2 {
+            ranged("price_per_m2", price, 0.0, 1e6)?;
+        }
+        match (self.price_per_m2, &self.currency) {
+            (Some(_), None) => Err(Complaint::new(
+                "price_per_m2",
+                "has no currency beside it: add, for example, currency = \"EUR\"",
+            )),
+            (None, Some(_)) => Err(Complaint::new(
+                "currency",
+                "has no meaning without price_per_m2",
+            )),
+            (_, Some(c)) if c.len() != 3 || !c.bytes().all(|b| b.is_ascii_uppercase()) => {
+                Err(Complaint::new(
+                    "currency",
+                    format!("is {c:?}; three capital letters are needed, for example \"EUR\""),
+                ))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn check_tip(&self) -> Result<(), Complaint> {
+        let Some(tip) = self.tip else { return Ok(()) };
+        match (tip.shape, tip.radius_mm) {
+            (TipShape::Plain, None) => Ok(()),
+            (TipShape::Plain, Some(_)) => Err(Complaint::new(
+                "tip.radius_mm",
+                "has no meaning with shape = \"plain\"; remove it, or choose \"round\" or \"teardrop\"",
+            )),
+            (_, None) => Err(Complaint::new(
+                "tip.radius_mm",
+                "is missing; a round or teardrop tip needs it",
+            )),
+            (_, Some(radius)) => ranged("tip.radius_mm", radius, 0.01, 10.0),
+        }
+    }
+
+    fn check_engravings(&self) -> Result<(), Complaint> {
+        for (i, entry) in self.engrave.iter().enumerate() {
+            entry.check(i)?;
+            let same = |e: &EngraveEntry| {
+                (e.process, e.laser, e.watts) == (entry.process, entry.laser, entry.watts)
+            };
+            if let Some(j) = self.engrave[..i].iter().position(same) {
+                return Err(Complaint::new(
+                    format!("engrave[{i}].process"),
+                    format!(
+                        "stands for {}, the same as engrave[{j}]: which of the two is meant?",
+                        entry.tool()
+                    ),
+                ));
+            }
+        }
+        Ok(())
     }
 
     fn check_sigma(&self) -> Result<(), Complaint> {
@@ -143,15 +263,20 @@ impl Material {
         }
         for (i, cut) in self.cut.iter().enumerate() {
             cut.check(i)?;
-            let twin = self.cut[..i]
-                .iter()
-                .position(|c| c.laser == cut.laser && c.watts == cut.watts);
-            if let Some(j) = twin {
+            let same = |c: &CutEntry| {
+                (c.process, c.laser, c.watts, c.amps)
+                    == (cut.process, cut.laser, cut.watts, cut.amps)
+            };
+            if let Some(j) = self.cut[..i].iter().position(same) {
+                let key = match cut.process {
+                    Process::Laser => "watts",
+                    Process::Plasma => "amps",
+                };
                 return Err(Complaint::new(
-                    format!("cut[{i}].watts"),
+                    format!("cut[{i}].{key}"),
                     format!(
-                        "is {} for a {} laser, the same as cut[{j}]: which of the two is meant?",
-                        cut.watts, cut.laser
+                        "makes it settings for {}, the same as cut[{j}]: which of the two is meant?",
+                        cut.tool()
                     ),
                 ));
             }

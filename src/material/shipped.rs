@@ -10,20 +10,25 @@ pub const DEFAULT: &str = "leather-1.6";
 /// Every file of `profiles/`, in the order of their names.
 const SHIPPED: &[(&str, &str)] = &[
     ("acrylic-3", include_str!("../../profiles/acrylic-3.toml")),
+    ("brass-0.2", include_str!("../../profiles/brass-0.2.toml")),
+    ("brass-1.5", include_str!("../../profiles/brass-1.5.toml")),
     (
         "cardboard-1.5",
         include_str!("../../profiles/cardboard-1.5.toml"),
     ),
     ("copper-0.2", include_str!("../../profiles/copper-0.2.toml")),
+    ("copper-1.5", include_str!("../../profiles/copper-1.5.toml")),
     ("felt-3", include_str!("../../profiles/felt-3.toml")),
     (
         "leather-1.6",
         include_str!("../../profiles/leather-1.6.toml"),
     ),
     ("plywood-3", include_str!("../../profiles/plywood-3.toml")),
+    ("steel-0.2", include_str!("../../profiles/steel-0.2.toml")),
+    ("steel-1.5", include_str!("../../profiles/steel-1.5.toml")),
 ];
 
-const CATALOG: Catalog = Catalog {
+pub(super) const CATALOG: Catalog = Catalog {
     kind: "material",
     shipped: SHIPPED,
 };
@@ -89,6 +94,99 @@ mod tests {
                 "hinge_width_mm = 1.0",
                 "hinge_width_mm = -1",
                 "hinge_width_mm",
+            ),
+            (
+                "thickness_mm = 1.6",
+                "thickness_mm = 1.6\ncorner_radius_mm = nan",
+                "corner_radius_mm",
+            ),
+            (
+                "thickness_mm = 1.6",
+                "thickness_mm = 1.6\nstock_mm = { x = 1, y = 500 }",
+                "stock_mm.x",
+            ),
+            (
+                "thickness_mm = 1.6",
+                "thickness_mm = 1.6\nprice_per_m2 = 9",
+                "price_per_m2",
+            ),
+            (
+                "thickness_mm = 1.6",
+                "thickness_mm = 1.6\ncurrency = \"EUR\"",
+                "currency",
+            ),
+            (
+                "thickness_mm = 1.6",
+                "thickness_mm = 1.6\nprice_per_m2 = -1\ncurrency = \"EUR\"",
+                "price_per_m2",
+            ),
+            (
+                "thickness_mm = 1.6",
+                "thickness_mm = 1.6\nprice_per_m2 = 1\ncurrency = \"Euro\"",
+                "currency",
+            ),
+            (
+                "[sigma]",
+                "[tip]\nshape = \"plain\"\nradius_mm = 1\n[sigma]",
+                "tip.radius_mm",
+            ),
+            (
+                "[sigma]",
+                "[tip]\nshape = \"round\"\n[sigma]",
+                "tip.radius_mm",
+            ),
+            (
+                "[sigma]",
+                "[tip]\nshape = \"teardrop\"\nradius_mm = 0\n[sigma]",
+                "tip.radius_mm",
+            ),
+            ("[sigma]", "[tip]\nshape = \"square\"\n[sigma]", ""),
+            ("kerf_mm = 0.2", "kerf_mm = 0.2\namps = 20", "cut[0].amps"),
+            (
+                "kerf_mm = 0.2",
+                "kerf_mm = 0.2\npierce_diameter_mm = 0.1",
+                "cut[0].pierce_diameter_mm",
+            ),
+            (
+                "kerf_mm = 0.2",
+                "kerf_mm = 0.2\nlead_in_mm = -1",
+                "cut[0].lead_in_mm",
+            ),
+            (
+                "kerf_mm = 0.2",
+                "kerf_mm = 0.2\nlead_out_mm = nan",
+                "cut[0].lead_out_mm",
+            ),
+            (
+                "kerf_mm = 0.2",
+                "kerf_mm = 0.2\novercut_mm = 51",
+                "cut[0].overcut_mm",
+            ),
+            (
+                "process = \"laser\"",
+                "process = \"plasma\"",
+                "cut[0].laser",
+            ),
+            ("watts = 40\n", "", "cut[0].watts"),
+            (
+                "[[engrave]]\nprocess = \"laser\"\nlaser = \"co2\"",
+                "[[engrave]]\nprocess = \"plasma\"\nlaser = \"co2\"",
+                "engrave[0].laser",
+            ),
+            (
+                "speed_mm_per_min = 6000",
+                "speed_mm_per_min = 0",
+                "engrave[0].speed_mm_per_min",
+            ),
+            (
+                "power_percent = 12",
+                "power_percent = 101",
+                "engrave[0].power_percent",
+            ),
+            (
+                "[[engrave]]\nprocess = \"laser\"\nlaser = \"diode\"\nwatts = 10",
+                "[[engrave]]\nprocess = \"laser\"\nlaser = \"co2\"\nwatts = 40",
+                "engrave[1].process",
             ),
             ("max = 1.8", "max = 2.5", "sigma.max"),
             ("max = 1.8", "max = 1", "sigma.max"),

@@ -113,7 +113,7 @@ impl Body {
                 },
             });
         }
-        if !(options.offset_mm.abs() <= 1e4) {
+        if options.offset_mm.is_nan() || options.offset_mm.abs() > 1e4 {
             return Err(BodyError::Length {
                 what: "the offset (--offset)",
                 value_mm: options.offset_mm,

@@ -18,6 +18,7 @@ use super::mark::{Label, Mark, MarkKind};
 use super::sheet::{Sheet, flat_vertices};
 use crate::base::curve::Curve;
 use crate::base::ids::{Id as _, Per};
+use crate::base::union::Union;
 use crate::linkage::{Colour, Linkage, TriangleId};
 
 /// Smaller text is not read any more, millimetres.
@@ -50,6 +51,9 @@ pub struct MarkOptions<'a> {
     pub back: bool,
 }
 
+/// A direction, and for every triangle the next one that way.
+type Rows = Option<(Vec2, Vec<Option<TriangleId>>)>;
+
 type Sides = Per<TriangleId, [Option<(TriangleId, usize)>; 3]>;
 
 /// The marks of a sheet that was made of this linkage, in the same frame.
@@ -68,8 +72,20 @@ pub fn marks(linkage: &Linkage, sheet: &Sheet, options: &MarkOptions<'_>) -> Vec
         .filter(|c| font::can_write(&c.to_string()))
         .take(MOST_LETTERS)
         .collect();
-    marker.text(name.trim(), MarkKind::Name);
-    marker.text(if options.back { "BACK" } else { "FRONT" }, MarkKind::Side);
+    let parts = marker.parts();
+    let rows = marker.rows();
+    for (n, part) in parts.iter().enumerate() {
+        // Of several parts each has a number.
+        let number = if parts.len() > 1 {
+            format!(" {}", n + 1)
+        } else {
+            String::new()
+        };
+        let name = format!("{}{number}", name.trim());
+        marker.text(name.trim(), MarkKind::Name, part, &rows);
+        let side = if options.back { "BACK" } else { "FRONT" };
+        marker.text(side, MarkKind::Side, part, &rows);
+    }
     marker.marks
 }
 
@@ -266,7 +282,7 @@ impl<'a> Marker<'a> {
                 }
                 let at = self.middle(t);
                 let lines = if count < 6 {
-                    vec![Curve::circle(at, size, true)]
+                    vec![Curve::circle(at, size, true).opened_at(0, 0.0)]
                 } else {
                     let d = Vec2::new(size, size) * 0.5f64.sqrt();
                     let e = Vec2::new(-d.y, d.x);
@@ -282,25 +298,25 @@ impl<'a> Marker<'a> {
     }
 
     /// A text along a row of triangles near the middle of the sheet, with as few letters in each as there is room for.
-    fn text(&mut self, text: &str, kind: MarkKind) {
+    fn text(&mut self, text: &str, kind: MarkKind, part: &[TriangleId], rows: &Rows) {
         let letters: Vec<char> = text.chars().collect();
         if letters.is_empty() {
             return;
         }
-        let Some((along, next)) = self.rows() else {
+        let Some((along, next)) = rows else {
             return;
         };
         let up = Vec2::new(-along.y, along.x);
-        let ids = || self.linkage.triangles.ids();
+        let ids = || part.iter().copied();
         let sum = ids().fold(Vec2::ZERO, |s, t| s + self.middle(t).to_vec2());
-        let centre = (sum / self.linkage.triangles.len() as f64).to_point();
+        let centre = (sum / part.len() as f64).to_point();
         for share in [1, 2, 3, letters.len()] {
             let words: Vec<String> = letters.chunks(share).map(|c| c.iter().collect()).collect();
             let form = Form::text(&words[0]);
             let row = |first: TriangleId| -> Option<Vec<TriangleId>> {
                 let mut row = vec![first];
                 while row.len() < words.len() {
-                    row.push(next[row.last()?.index()]?);
+                    row.push(next[row.last()?.index()].filter(|t| self.free(*t))?);
                 }
                 Some(row)
             };
@@ -345,8 +361,23 @@ impl<'a> Marker<'a> {
             && self.holes[t.index()] == 0.0
     }
 
-    /// The lattice direction nearest to X, and for every triangle of one colour the next one that way, if it is free.
-    fn rows(&self) -> Option<(Vec2, Vec<Option<TriangleId>>)> {
+    /// The triangles of each part of the sheet.
+    fn parts(&self) -> Vec<Vec<TriangleId>> {
+        let mut sets = Union::new(self.linkage.triangles.len());
+        for (t, beside) in self.flat.iter_ids() {
+            for (n, _) in beside.iter().flatten() {
+                sets.join(t.index(), n.index());
+            }
+        }
+        let mut parts: BTreeMap<usize, Vec<TriangleId>> = BTreeMap::new();
+        for t in self.linkage.triangles.ids() {
+            parts.entry(sets.root(t.index())).or_default().push(t);
+        }
+        parts.into_values().collect()
+    }
+
+    /// The lattice direction nearest to X, and for every triangle of one colour the next one that way.
+    fn rows(&self) -> Rows {
         let up = |t: &TriangleId| self.linkage.triangles[*t].colour == Colour::Up;
         let first = self.linkage.triangles.ids().find(up)?;
         let corners = self.corners(first);
@@ -360,7 +391,7 @@ impl<'a> Marker<'a> {
             beside
                 .flat_map(|n| self.flat[n.0].iter().flatten())
                 .map(|n| n.0)
-                .find(|&n| self.free(n) && self.middle(n).distance(there) < near)
+                .find(|&n| up(&n) && self.middle(n).distance(there) < near)
         });
         Some((along / along.hypot(), next.collect()))
     }

@@ -13,6 +13,7 @@ mod dxf;
 mod font;
 mod mark;
 mod marks;
+mod nest;
 mod path_data;
 mod place;
 mod read_svg;
@@ -26,7 +27,8 @@ pub use dxf::dxf;
 pub use font::{can_write, width_mm};
 pub use mark::{Label, Mark, MarkKind};
 pub use marks::{MarkOptions, marks};
-pub use place::{Motion, on_bed, placed};
+pub use nest::{Nested, StockArea, fits_stock, nest};
+pub use place::{Motion, on_bed, placed, placed_on};
 pub use read_svg::{Drawing, SvgError, read_drawing, read_svg};
 pub use sheet::{
     Contour, Figures, MAX_NECK, PatternError, Sheet, SheetMetadata, SheetOptions, Slit, Tab, Tip,

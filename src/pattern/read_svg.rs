@@ -315,7 +315,7 @@ fn property<'a>(node: Node<'a>, name: &str) -> Option<&'a str> {
         let all = style.split(';').filter_map(|p| p.split_once(':'));
         all.filter(|(key, _)| key.trim() == name)
             .map(|(_, value)| value.trim())
-            .last()
+            .next_back()
     });
     in_style.or_else(|| node.attribute(name))
 }

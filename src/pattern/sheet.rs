@@ -152,7 +152,7 @@ pub struct Sheet {
 }
 
 /// What a sheet amounts to.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Figures {
     /// Number of triangles, flap triangles not counted.
     pub triangles: usize,
@@ -308,7 +308,7 @@ pub enum PatternError {
     },
     /// Larger than the bed.
     #[error(
-        "the sheet is {width_mm:.1} x {height_mm:.1} mm with its cut, and the bed has {bed_width_mm:.1} x {bed_height_mm:.1} mm inside its margins, either way round. It fits with triangles of edge {fitting_edge_mm:.3} mm or less in the same number (--scale {fitting_scale:.4} of this size), or on a larger machine"
+        "the sheet is {width_mm:.1} x {height_mm:.1} mm with its cut, and there is room for {bed_width_mm:.1} x {bed_height_mm:.1} mm inside the margins, whichever way it is turned. It fits with triangles of edge {fitting_edge_mm:.3} mm or less in the same number (--scale {fitting_scale:.4} of this size), or on a larger machine"
     )]
     TooLarge {
         /// Width with half a cut on each side.
@@ -338,7 +338,7 @@ fn narrower(largest_hinge_mm: f64) -> String {
     if largest_hinge_mm > 0.0 {
         format!(", or the hinge at most {largest_hinge_mm:.3} mm wide (--hinge)")
     } else {
-        ": the kerf alone is too wide for them".into()
+        ": the cut alone is too wide for them".into()
     }
 }
 
@@ -469,6 +469,25 @@ impl Sheet {
             tabs: Vec::new(),
             metadata,
         })
+    }
+
+    /// Nothing to cut.
+    pub(super) fn empty() -> Self {
+        Self {
+            slits: Vec::new(),
+            contours: Vec::new(),
+            triangles: Vec::new(),
+            flaps: Vec::new(),
+            marks: Vec::new(),
+            tabs: Vec::new(),
+            metadata: SheetMetadata {
+                hinge_width_mm: 1.0,
+                kerf_mm: 0.1,
+                edge_mm: 10.0,
+                tip: Tip::Plain,
+                corner_radius_mm: 0.0,
+            },
+        }
     }
 
     /// The smallest rectangle around all contours.

@@ -120,12 +120,20 @@ impl Settings {
             machine.bed.height_mm,
             standard.travel_mm[2],
         ];
-        Self {
-            receive_buffer: machine.connection.receive_buffer_bytes as usize,
-            planner_blocks: machine.connection.planner_blocks as usize,
-            baud: Some(f64::from(machine.connection.baud)),
-            ..Self::laser(&limits, travel_mm, machine.laser.s_max)
+        // A torch is an output that is on or off, also at rest: not laser mode.
+        let mut settings = match machine.laser() {
+            Some(laser) => Self::laser(&limits, travel_mm, laser.s_max),
+            None => Self {
+                laser_mode: false,
+                ..Self::laser(&limits, travel_mm, standard.s_max)
+            },
+        };
+        if let Some(connection) = &machine.connection {
+            settings.receive_buffer = connection.receive_buffer_bytes as usize;
+            settings.planner_blocks = connection.planner_blocks as usize;
+            settings.baud = Some(f64::from(connection.baud));
         }
+        settings
     }
 
     /// What the planner needs.

@@ -13,5 +13,5 @@ mod star;
 
 pub use kerf::{CHORD_ERROR_MM, outline, without_tabs};
 pub use path::{
-    CornerSlowdown, Cut, CutOptions, Figures, PassOrder, Role, Step, Toolpath, ToolpathError, plan,
+    CornerSlowdown, Cut, CutOptions, Figures, Role, Step, Toolpath, ToolpathError, plan,
 };

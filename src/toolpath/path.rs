@@ -5,7 +5,8 @@ use kurbo::Point;
 use super::scrap::Scrap;
 use super::{kerf, order, star};
 use crate::base::curve::{Curve, Piece};
-use crate::material::CutSetting;
+use crate::machine::Machine;
+use crate::material::{CutSetting, MarkSetting, PassOrder};
 use crate::pattern::{Sheet, Star};
 
 /// What a cut is for; also the order in which cuts are made.
@@ -257,16 +258,6 @@ impl Toolpath {
     }
 }
 
-/// In which order several passes are made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PassOrder {
-    /// Each cut to its depth, then the next: no pass has to find its groove again.
-    #[default]
-    Cut,
-    /// All slits once, then all of them again: cooler, and slower.
-    Sheet,
-}
-
 /// Where a torch must slow down, because it leans in corners.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CornerSlowdown {
@@ -304,19 +295,24 @@ pub struct CutOptions {
 }
 
 impl CutOptions {
-    /// As a material's profile says.
-    pub fn of(setting: &CutSetting) -> Self {
+    /// As the profiles say; marks are engraved if there are settings for them.
+    pub fn of(setting: &CutSetting, machine: &Machine, marks: Option<&MarkSetting>) -> Self {
+        let corner = machine.plasma().and_then(|torch| torch.corner);
         Self {
             feed_mm_per_min: setting.speed_mm_per_min,
             power_percent: setting.power_percent,
             passes: setting.passes.max(1),
-            pass_order: PassOrder::Cut,
-            pierce_mm: setting.kerf_mm,
-            lead_in_mm: 0.0,
-            lead_out_mm: 0.0,
-            overcut_mm: 0.0,
-            corner: None,
-            engrave: None,
+            pass_order: setting.pass_order,
+            pierce_mm: setting.pierce_diameter_mm,
+            lead_in_mm: setting.lead_in_mm,
+            lead_out_mm: setting.lead_out_mm,
+            overcut_mm: setting.overcut_mm,
+            corner: corner.map(|c| CornerSlowdown {
+                angle: c.angle_deg.to_radians(),
+                distance_mm: c.distance_mm,
+                percent: c.percent,
+            }),
+            engrave: marks.map(|m| (m.speed_mm_per_min, m.power_percent)),
         }
     }
 }
@@ -578,9 +574,13 @@ mod tests {
     use crate::pattern::SheetOptions;
 
     fn options(passes: u32) -> CutOptions {
-        let mut setting = crate::material::load("leather-1.6").unwrap().cut[0].clone();
-        setting.passes = passes;
-        CutOptions::of(&setting)
+        let machine = crate::machine::load(crate::machine::DEFAULT).unwrap();
+        let material = crate::material::load("leather-1.6").unwrap();
+        let setting = material.cut_for(&machine).unwrap();
+        CutOptions {
+            passes,
+            ..CutOptions::of(&setting, &machine, None)
+        }
     }
 
     fn ring() -> Sheet {

@@ -51,12 +51,19 @@ pub struct Page<'a> {
     pub distance_limit_in_l: f64,
     /// The largest λ that the material allows.
     pub sigma: f64,
-    /// `pattern.svg`, if there is one.
-    pub sheet_svg: Option<&'a str>,
-    /// The toolpath in the order of the machine, if there is one.
-    pub toolpath: Option<&'a [Stroke]>,
+    /// What is cut, sheet by sheet; none if nothing may be.
+    pub sheets: &'a [DrawnSheet],
     /// `report.json`.
     pub figures: &'a serde_json::Value,
+}
+
+/// A sheet and its toolpath.
+#[derive(Clone, Debug)]
+pub struct DrawnSheet {
+    /// Its `pattern.svg`.
+    pub svg: String,
+    /// The toolpath in the order of the machine.
+    pub toolpath: Vec<Stroke>,
 }
 
 /// The linkage on one surface.
@@ -312,10 +319,15 @@ fn hinges(out: &mut String, page: &Page<'_>, pose: &Pose<'_>) {
 }
 
 fn sheet(out: &mut String, page: &Page<'_>) {
-    let Some(svg) = page.sheet_svg.and_then(svg_element) else {
+    let drawings: Vec<&str> = page
+        .sheets
+        .iter()
+        .filter_map(|s| svg_element(&s.svg))
+        .collect();
+    if drawings.is_empty() {
         return;
-    };
-    let (words, key) = if svg.contains("id=\"flaps\"") {
+    }
+    let (words, key) = if drawings.iter().any(|svg| svg.contains("id=\"flaps\"")) {
         (
             " Shaded rows are flaps: each of their triangles doubles one on the other side of the seam, and is glued on it.",
             "<span style=\"--c:#00a000\">slits of flaps</span>",
@@ -323,26 +335,45 @@ fn sheet(out: &mut String, page: &Page<'_>) {
     } else {
         ("", "")
     };
+    let several = drawings.len() > 1;
     let _ = write!(
         out,
-        "<section><h2>The sheet</h2><p class=\"lead\">What is cut: slits, then the outline. Every slit ends a hinge's width before its star.{words}</p><figure class=\"sheet\">{svg}<div class=\"note\"><span style=\"--c:#0000ff\">slits</span>{key}<span style=\"--c:#ff0000\">outline</span></div></figure></section>"
+        "<section><h2>The sheet{}</h2><p class=\"lead\">What is cut: slits, then the outline. Every slit ends a hinge's width before its star.{words}</p>",
+        if several { "s" } else { "" }
     );
+    for (n, svg) in drawings.iter().enumerate() {
+        let caption = if several {
+            format!("<figcaption>sheet {}</figcaption>", n + 1)
+        } else {
+            String::new()
+        };
+        let _ = write!(
+            out,
+            "<figure class=\"sheet\">{svg}<div class=\"note\"><span style=\"--c:#0000ff\">slits</span>{key}<span style=\"--c:#ff0000\">outline</span></div>{caption}</figure>"
+        );
+    }
+    out.push_str("</section>");
 }
 
 fn toolpath(out: &mut String, page: &Page<'_>) {
-    let Some(svg) = page.toolpath.and_then(strokes::drawing) else {
+    for (n, sheet) in page.sheets.iter().enumerate() {
+        let name = if page.sheets.len() > 1 {
+            format!(", sheet {}", n + 1)
+        } else {
+            String::new()
+        };
+        order_of_cutting(out, &name, &sheet.toolpath);
+    }
+}
+
+fn order_of_cutting(out: &mut String, name: &str, toolpath: &[Stroke]) {
+    let Some(svg) = strokes::drawing(toolpath) else {
         return;
     };
-    let count = |role: Role| {
-        page.toolpath
-            .unwrap_or_default()
-            .iter()
-            .filter(|s| s.role == role)
-            .count()
-    };
+    let count = |role: Role| toolpath.iter().filter(|s| s.role == role).count();
     let _ = write!(
         out,
-        "<section><h2>Order of cutting</h2><p class=\"lead\">{} strokes for slits and {} for outlines, from the first (dot) to the last.</p><figure class=\"path\">{svg}<div class=\"note\"><span style=\"--c:{}\">first</span><span style=\"--c:{}\">last</span><span style=\"--c:{}\">travel, beam off</span>{}</div></figure></section>",
+        "<section><h2>Order of cutting{name}</h2><p class=\"lead\">{} strokes for slits and {} for outlines, from the first (dot) to the last.</p><figure class=\"path\">{svg}<div class=\"note\"><span style=\"--c:{}\">first</span><span style=\"--c:{}\">last</span><span style=\"--c:{}\">travel, beam off</span>{}</div></figure></section>",
         count(Role::Cut),
         count(Role::Contour),
         strokes::FIRST.css(),

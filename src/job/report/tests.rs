@@ -72,6 +72,10 @@ fn with_page<T>(full: bool, then: impl FnOnce(&Page<'_>) -> T) -> T {
         role: Role::Cut,
         points: vec![Point2::new(0.0, 0.0), Point2::new(5.0, 5.0)],
     }];
+    let sheets = [DrawnSheet {
+        svg: SHEET.into(),
+        toolpath: strokes.to_vec(),
+    }];
     let pose = Pose {
         name: "dish",
         surface: &job.surface,
@@ -90,8 +94,7 @@ fn with_page<T>(full: bool, then: impl FnOnce(&Page<'_>) -> T) -> T {
         poses: &[pose],
         distance_limit_in_l: 0.1,
         sigma: 2.0,
-        sheet_svg: full.then_some(SHEET),
-        toolpath: full.then_some(&strokes),
+        sheets: if full { &sheets } else { &[] },
         figures: &serde_json::json!({ "quality": { "edge": "<b>" } }),
     })
 }
@@ -218,8 +221,10 @@ fn lists_that_are_too_short_leave_things_out_and_do_not_fail() {
                 openings: &[],
                 ..page.poses[0]
             }],
-            sheet_svg: Some("no drawing"),
-            toolpath: Some(&[]),
+            sheets: &[DrawnSheet {
+                svg: "no drawing".into(),
+                toolpath: vec![],
+            }],
             sigma: f64::NAN,
             ..*page
         })
