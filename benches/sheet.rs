@@ -10,7 +10,8 @@ use kagome::linkage::{Handedness, Linkage};
 use kagome::machine::{self, Machine};
 use kagome::material::{self, CutSetting, Material};
 use kagome::pattern::{self, Sheet, SheetOptions};
-use kagome::toolpath::{self, Toolpath};
+use kagome::toolpath::{self, Heat, Toolpath};
+use kurbo::Point;
 
 fn main() {
     divan::main();
@@ -78,8 +79,42 @@ fn svg_read(bencher: divan::Bencher<'_, '_>, radius: i32) {
     bencher.bench(|| pattern::read_svg(&text));
 }
 
+/// Strokes of two to a star, as many stars as it takes.
+fn strokes(n: usize) -> Vec<[Point; 2]> {
+    let side = (n as f64 / 2.0).sqrt().ceil() as usize;
+    (0..n)
+        .map(|k| {
+            let star = k / 2;
+            let (i, j) = ((star % side) as f64, (star / side) as f64);
+            let centre = Point::new(14.0 * i + 7.0 * (j % 2.0), 12.0 * j);
+            let arm = |x: f64, y: f64| centre + (7.0 * x, 7.0 * y);
+            if k % 2 == 0 {
+                [arm(1.0, 0.0), arm(-0.5, 0.866)]
+            } else {
+                [centre, arm(-0.5, -0.866)]
+            }
+        })
+        .collect()
+}
+
+#[divan::bench(args = [1000, 10_000, 100_000], sample_count = 3)]
+fn order(bencher: divan::Bencher<'_, '_>, n: usize) {
+    let ends = strokes(n);
+    bencher.bench(|| toolpath::order_strokes(&ends, Point::ZERO, false, Heat::NONE));
+}
+
+#[divan::bench(args = [1000, 10_000, 100_000], sample_count = 3)]
+fn order_cool(bencher: divan::Bencher<'_, '_>, n: usize) {
+    let ends = strokes(n);
+    let heat = Heat {
+        price_mm: 20.0,
+        reach_mm: 20.0,
+    };
+    bencher.bench(|| toolpath::order_strokes(&ends, Point::ZERO, false, heat));
+}
+
 #[divan::bench(args = RADII, sample_count = 5)]
-fn order(bencher: divan::Bencher<'_, '_>, radius: i32) {
+fn toolpath_of(bencher: divan::Bencher<'_, '_>, radius: i32) {
     let c = case(radius);
     bencher.bench(|| {
         toolpath::plan(

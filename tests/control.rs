@@ -114,56 +114,6 @@ fn after_a_job_the_burnt_sheet_equals_the_intended_one() {
     assert!(rehearsal.report.max_in_flight <= 128 && rehearsal.report.max_in_flight > 100);
 }
 
-/// Recorded from stock GRBL 1.1h: seconds from the first step to the report of Idle, and seconds with the beam on.
-#[test]
-fn times_are_those_recorded_from_stock_grbl() {
-    // The output follows the speed in steps of 10 ms and is off for the last one before each stop: thirteen of those
-    // weigh in a recording of 4 s.
-    for (name, limits, tolerance, idle_s, (beam_s, beam_tolerance)) in [
-        (
-            "recorded_long.nc",
-            (10000.0, 700.0),
-            0.001,
-            53.345,
-            (33.773_543, 0.003),
-        ),
-        (
-            "recorded_arcs.nc",
-            (6000.0, 500.0),
-            0.003,
-            50.733,
-            (30.371, 0.003),
-        ),
-        // Dwells are a fifth of this one: within 1 %.
-        (
-            "recorded_dwells.nc",
-            (6000.0, 500.0),
-            0.03,
-            4.076,
-            (2.551, 0.07),
-        ),
-    ] {
-        let text =
-            std::fs::read(format!("{}/tests/data/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
-        let settings = Settings {
-            max_rate_mm_min: [limits.0, limits.0, 3000.0],
-            acceleration_mm_s2: [limits.1; 3],
-            ..Settings::default()
-        };
-        let r = rehearse(&text, &settings, &JobRules::default(), &Silent).unwrap();
-        assert!(
-            (r.time_s / idle_s - 1.0).abs() < tolerance,
-            "{name} {} {idle_s}",
-            r.time_s
-        );
-        let beam = r.summary.beam_on_s;
-        assert!(
-            (beam / beam_s - 1.0).abs() < beam_tolerance,
-            "{name} {beam} {beam_s}"
-        );
-    }
-}
-
 #[test]
 fn an_unplugged_job_ends_dark_and_within_its_path_wherever_the_cable_is_cut() {
     let cuts = slits(12);

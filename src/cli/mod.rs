@@ -20,7 +20,7 @@ pub mod send;
 pub mod sheet_args;
 pub mod sim;
 pub mod states;
-mod surface_args;
+pub mod surface_args;
 pub mod template;
 mod terminal;
 pub mod verify;

@@ -22,6 +22,15 @@ pub(super) const JOINT_MM: f64 = 2.0 * TOLERANCE_MM;
 /// Wanted arcs as chords: much finer than the tolerance.
 const CHORD_MM: f64 = 0.0005;
 
+/// What burnt lines may differ by from wanted ones, millimetres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slack {
+    /// Across the line.
+    pub sideways_mm: f64,
+    /// Along it, where the beam is off a little before it stands.
+    pub gap_mm: f64,
+}
+
 /// What a line of a sheet is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
@@ -237,7 +246,7 @@ pub(super) fn compare(
     burnt: &[(Option<usize>, Segment)],
     wanted: &Wanted,
     passes: u32,
-    gap_mm: f64,
+    slack: Slack,
     scrap: &dyn Fn(&Segment) -> bool,
     findings: &mut Vec<Finding>,
 ) {
@@ -251,7 +260,7 @@ pub(super) fn compare(
         let range = &cut.range;
         let mut whole = 0.0;
         for segment in &wanted.segments[range.clone()] {
-            burnt_index.along(segment, TOLERANCE_MM, &mut pieces);
+            burnt_index.along(segment, slack.sideways_mm, &mut pieces);
             let length = segment.length();
             pieces.runs(
                 true,
@@ -273,7 +282,7 @@ pub(super) fn compare(
             missing.close(whole);
             repeated.close(whole);
         }
-        let missing = missing.take(|_| gap_mm);
+        let missing = missing.take(|_| slack.gap_mm);
         // At a corner each of its two sides may lie within the tolerance of the other.
         let repeated = repeated.take(|s| {
             let joint = if s.corner { 2.0 * JOINT_MM } else { JOINT_MM };
@@ -312,7 +321,7 @@ pub(super) fn compare(
     }
     let wanted_index = Index::new(wanted.segments.clone());
     for (line, segment) in burnt {
-        wanted_index.along(segment, TOLERANCE_MM, &mut pieces);
+        wanted_index.along(segment, slack.sideways_mm, &mut pieces);
         let length = segment.length();
         let mut stray: Option<(f64, Point)> = None;
         if length <= NO_GAP_MM {

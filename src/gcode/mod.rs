@@ -13,6 +13,7 @@ mod round_trip;
 mod verify;
 mod write;
 
+pub use compare::Slack;
 pub use interpret::{Beam, Move, Program, read};
 pub use ligament::Ligaments;
 pub use verify::{Finding, Rule, TOLERANCE_MM, Verdict, compare_burnt, verify};

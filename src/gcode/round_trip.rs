@@ -5,7 +5,9 @@ use std::collections::BTreeSet;
 use kurbo::Vec2;
 use proptest::prelude::*;
 
-use super::{Declared, Finding, Rule, compare_burnt, passes_of, read, verify, write};
+use super::{
+    Declared, Finding, Rule, Slack, TOLERANCE_MM, compare_burnt, passes_of, read, verify, write,
+};
 use crate::base::ids::Id;
 use crate::linkage::{Handedness, Linkage, TriangleId};
 use crate::machine::{self, Machine};
@@ -179,6 +181,11 @@ proptest! {
         if !sheet.slits.is_empty() {
             prop_assert!((ligaments.narrowest_mm - 0.8).abs() < 0.003, "{}", ligaments.narrowest_mm);
         }
+        // A pierce hole said to be wider reaches a ligament, or the part beside a lead.
+        if pierce > 0.2 {
+            let wider = text.replace("; pierce 0.9\n", "; pierce 8\n");
+            prop_assert!(findings(&wider, &machine, &sheet, passes).iter().any(|f| f.rule == Rule::Pierce));
+        }
         // Without its header's word nothing is burnt beside the drawing.
         let bare: String = text.lines().filter(|l| *l != "; leads").map(|l| format!("{l}\n")).collect();
         let leads = text.contains("; leads\n");
@@ -330,7 +337,17 @@ fn a_missing_corner_of_short_pieces_is_found_as_one_gap() {
         .collect();
     const GAP_MM: f64 = 0.06;
     assert_eq!(
-        compare_burnt(&sheet, &all, 1, &Declared::default(), GAP_MM).unwrap(),
+        compare_burnt(
+            &sheet,
+            &all,
+            1,
+            &Declared::default(),
+            Slack {
+                sideways_mm: TOLERANCE_MM,
+                gap_mm: GAP_MM
+            }
+        )
+        .unwrap(),
         []
     );
     let is_short = |p: &[kurbo::Point; 2]| p[0].distance(p[1]) < GAP_MM - 0.02;
@@ -359,7 +376,10 @@ fn a_missing_corner_of_short_pieces_is_found_as_one_gap() {
         &without(longest.clone()),
         1,
         &Declared::default(),
-        GAP_MM,
+        Slack {
+            sideways_mm: TOLERANCE_MM,
+            gap_mm: GAP_MM,
+        },
     )
     .unwrap();
     assert_eq!(
@@ -370,7 +390,17 @@ fn a_missing_corner_of_short_pieces_is_found_as_one_gap() {
     // One piece alone is a gap that is allowed.
     let one = longest.start..longest.start + 1;
     assert_eq!(
-        compare_burnt(&sheet, &without(one), 1, &Declared::default(), GAP_MM).unwrap(),
+        compare_burnt(
+            &sheet,
+            &without(one),
+            1,
+            &Declared::default(),
+            Slack {
+                sideways_mm: TOLERANCE_MM,
+                gap_mm: GAP_MM
+            }
+        )
+        .unwrap(),
         []
     );
 }

@@ -4,10 +4,10 @@ use std::fmt;
 
 use kurbo::Point;
 
-use super::compare::{Kind, NO_GAP_MM, Wanted, compare};
+use super::compare::{Kind, NO_GAP_MM, Slack, Wanted, compare};
 use super::coverage::{Index, Segment};
 use super::interpret::{Program, read};
-use super::ligament::{Ligaments, Outside, check_order, distance, measure};
+use super::ligament::{Ligaments, Outside, check_order, check_pierces, distance, measure};
 use super::write::{Declared, passes_of};
 use crate::base::units::short;
 use crate::machine::{Machine, PowerMode};
@@ -169,10 +169,22 @@ pub fn verify(
             .collect();
         let outside = Outside::new(sheet, &wanted);
         let scrap = |piece: &Segment| declared.leads && outside.is_scrap(piece);
-        compare(&burnt, &wanted, n, NO_GAP_MM, &scrap, &mut findings);
+        let exact = Slack {
+            sideways_mm: TOLERANCE_MM,
+            gap_mm: NO_GAP_MM,
+        };
+        compare(&burnt, &wanted, n, exact, &scrap, &mut findings);
         check_order(sheet, &wanted, &burnt, &mut findings);
+        let engraved = if declared.marks {
+            engraved(&program, &wanted, &mut findings)
+        } else {
+            vec![false; burnt.len()]
+        };
+        if declared.pierce_mm > sheet.metadata.kerf_mm {
+            let starts = pierces(&program, &engraved);
+            check_pierces(sheet, &outside, &starts, declared.pierce_mm, &mut findings);
+        }
         let cuts = if declared.marks {
-            let engraved = engraved(&program, &wanted, &mut findings);
             burnt
                 .into_iter()
                 .zip(engraved)
@@ -308,6 +320,21 @@ fn check_moves(program: &Program, machine: &Machine, findings: &mut Vec<Finding>
     }
 }
 
+/// Where the beam goes on to cut; `engraved` says of each burning move whether it marks.
+fn pierces(program: &Program, engraved: &[bool]) -> Vec<(Option<usize>, Point)> {
+    let mut starts = Vec::new();
+    let mut burning = false;
+    let mut marks = engraved.iter();
+    for m in &program.moves {
+        let mark = m.burns() && marks.next().copied().unwrap_or(false);
+        if m.burns() && !burning && !mark {
+            starts.extend(m.from.map(|from| (Some(m.line), from)));
+        }
+        burning = m.burns();
+    }
+    starts
+}
+
 /// For each burning move whether it engraves a mark. A mark that gets as much energy a millimetre as the gentlest cut is a
 /// finding: it would go through.
 fn engraved(program: &Program, wanted: &Wanted, findings: &mut Vec<Finding>) -> Vec<bool> {
@@ -355,8 +382,7 @@ fn engraved(program: &Program, wanted: &Wanted, findings: &mut Vec<Finding>) -> 
 /// often as wanted but for gaps up to `gap_mm`, and nothing else. Findings carry no line.
 ///
 /// # Tolerance
-/// Sideways [`TOLERANCE_MM`]. `gap_mm`, measured along the cut and round its corners, is for what a controller does at the ends of a stroke, where it switches the
-/// beam off a little before it stands.
+/// What `slack` says: gaps are measured along the cut and round its corners.
 ///
 /// # Errors
 /// [`ToolpathError`] if the sheet itself cannot be cut with its kerf.
@@ -365,7 +391,7 @@ pub fn compare_burnt(
     burnt: &[[Point; 2]],
     passes: u32,
     declared: &Declared,
-    gap_mm: f64,
+    slack: Slack,
 ) -> Result<Vec<Finding>, ToolpathError> {
     let burnt: Vec<(Option<usize>, Segment)> = burnt
         .iter()
@@ -375,7 +401,7 @@ pub fn compare_burnt(
     let wanted = Wanted::new(sheet, declared)?;
     let outside = Outside::new(sheet, &wanted);
     let scrap = |piece: &Segment| declared.leads && outside.is_scrap(piece);
-    compare(&burnt, &wanted, passes, gap_mm, &scrap, &mut findings);
+    compare(&burnt, &wanted, passes, slack, &scrap, &mut findings);
     Ok(findings)
 }
 

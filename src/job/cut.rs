@@ -11,7 +11,7 @@ use super::MakeError;
 use crate::base::progress::Progress;
 use crate::base::units::short;
 use crate::control::JobRules;
-use crate::gcode::{self, compare_burnt};
+use crate::gcode::{self, Slack, compare_burnt};
 use crate::machine::{Machine, PowerMode};
 use crate::material::{CutSetting, Material};
 use crate::pattern::{self, Sheet};
@@ -51,6 +51,15 @@ fn stop_gap_mm(machine: &Machine) -> f64 {
         .x
         .hypot(machine.motion.acceleration_mm_per_s2.y);
     0.5 * fastest * DARK_S * DARK_S + gcode::TOLERANCE_MM
+}
+
+/// A real machine stands on steps of its motors: half of one in each axis comes on top of the verifier's tolerance.
+fn slack(machine: &Machine) -> Slack {
+    let [x, y, _] = Settings::of_machine(machine).steps_per_mm;
+    Slack {
+        sideways_mm: gcode::TOLERANCE_MM + (0.5 / x).hypot(0.5 / y),
+        gap_mm: stop_gap_mm(machine),
+    }
 }
 
 /// Plans, writes, verifies and rehearses the cut of `sheet`, which lies in its place on the bed.
@@ -102,7 +111,7 @@ pub(crate) fn cut(
         &burnt,
         setting.passes,
         &gcode::Declared::of(&gcode),
-        stop_gap_mm(machine),
+        slack(machine),
     )
     .map_err(MakeError::Toolpath)?;
     objections.extend(listed(
@@ -173,8 +182,13 @@ pub fn cut_drawing(
     if place {
         let (placed, motion) =
             pattern::placed(&sheet, &machine, false).map_err(MakeError::Pattern)?;
-        if motion.turn != [1.0, 0.0] {
-            warnings.push("the drawing was turned, to fit the bed".into());
+        let [cos, sin] = motion.turn;
+        let turned_deg = sin.atan2(cos).to_degrees();
+        if turned_deg != 0.0 {
+            warnings.push(format!(
+                "the drawing was turned by {}°, to fit the bed",
+                short(turned_deg, 0)
+            ));
         }
         sheet = placed;
     }

@@ -30,7 +30,7 @@ use crate::linkage::{write_glb, write_obj};
 use crate::machine::Machine;
 use crate::material::{CutSetting, Material, TipShape};
 use crate::mesh::{PartChoice, Surface, write};
-use crate::pattern::{self, SheetOptions, Tip};
+use crate::pattern::{self, HingeRisk, SheetOptions, Tip, hinge_risks};
 use crate::rationalize::{Quality, Solver, hinge_scales};
 use crate::toolpath::{Role, Toolpath};
 
@@ -40,11 +40,11 @@ pub const FILES: [&str; 82] = [
     "layout.obj",
     "linkage.obj",
     "linkage.glb",
+    "report.json",
+    "report.html",
     "pattern.svg",
     "pattern.dxf",
     "job.nc",
-    "report.json",
-    "report.html",
     "pattern-2.svg",
     "pattern-2.dxf",
     "job-2.nc",
@@ -119,14 +119,14 @@ pub const FILES: [&str; 82] = [
     "linkage-9.obj",
     "layout-9.obj",
 ];
-/// Those of every result; drawing and job of each further sheet follow, then linkage and layout on each further surface.
-const OWN_FILES: usize = 9;
-/// Drawing, twice, and job of each further sheet.
+/// Those of every result; drawings and job of each sheet follow, then linkage and layout on each further surface.
+const OWN_FILES: usize = 6;
+/// SVG, DXF and job of each sheet.
 const FILES_A_SHEET: usize = 3;
 /// Where those of further surfaces begin.
 const SURFACE_FILES: usize = FILES.len() - 2 * (MOST_SURFACES - 1);
 /// Sheets of one result at the most.
-const MOST_SHEETS: usize = 1 + (SURFACE_FILES - OWN_FILES) / FILES_A_SHEET;
+const MOST_SHEETS: usize = (SURFACE_FILES - OWN_FILES) / FILES_A_SHEET;
 
 /// Everything made, in memory.
 #[derive(Debug)]
@@ -178,8 +178,39 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     if !shape.verdict.pass && request.solver == Solver::Exact {
         remedy::explain(request, &mut shape, &stock, &targets, progress)?;
     }
-    let warnings = tell::warnings(&loaded, &material, &shape, stock.sigma);
+    let mut warnings = tell::warnings(&loaded, &material, &shape, stock.sigma);
 
+    let edge_mm = shape.flat.edge_mm;
+    let measured: Vec<(Vec<f64>, Vec<f64>)> = shape
+        .fits
+        .iter()
+        .zip(&targets.0)
+        .map(|(fit, target)| {
+            let distance = |p: &Point3<f64>| target.closest.query(*p).distance / edge_mm;
+            (
+                fit.positions.iter().map(distance).collect(),
+                hinge_scales(&shape.linkage, &fit.positions),
+            )
+        })
+        .collect();
+    let ligament = stock.options.ligament(edge_mm, material.thickness_mm);
+    let risks: Vec<Vec<HingeRisk>> = shape
+        .fits
+        .iter()
+        .zip(&measured)
+        .map(|(fit, (_, openings))| {
+            hinge_risks(
+                &shape.linkage,
+                &fit.positions,
+                openings,
+                &ligament,
+                stock.sigma,
+            )
+        })
+        .collect();
+    for (fit, risks) in shape.fits.iter().zip(&risks) {
+        warnings.extend(tell::risk(fit, risks));
+    }
     if shape.sheets.len() > MOST_SHEETS {
         return Err(MakeError::TooManySheets {
             sheets: shape.sheets.len(),
@@ -223,7 +254,6 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
             toolpath: drawn(&job.toolpath),
         })
         .collect();
-    let edge_mm = shape.flat.edge_mm;
     // Of several surfaces each as it was slit, else the one that was mapped, with its own λ.
     let slit: Vec<&Surface> = match &shape.ground.shapes[..] {
         [] => vec![&shape.ground.surface],
@@ -236,18 +266,6 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
             .map(|s| Cow::Owned(on_shape(&shape.flat.layout, s)))
             .collect(),
     };
-    let measured: Vec<(Vec<f64>, Vec<f64>)> = shape
-        .fits
-        .iter()
-        .zip(&targets.0)
-        .map(|(fit, target)| {
-            let distance = |p: &Point3<f64>| target.closest.query(*p).distance / edge_mm;
-            (
-                fit.positions.iter().map(distance).collect(),
-                hinge_scales(&shape.linkage, &fit.positions),
-            )
-        })
-        .collect();
     let poses: Vec<Pose<'_>> = (0..shape.fits.len())
         .map(|n| Pose {
             name: &targets.0[n].name,
@@ -256,6 +274,7 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
             positions: &shape.fits[n].positions,
             distances_in_l: &measured[n].0,
             openings: &measured[n].1,
+            risks: &risks[n],
         })
         .collect();
     let page = Page {
@@ -292,18 +311,16 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         ("report.json", (report + "\n").into_bytes()),
         ("report.html", html.into_bytes()),
     ];
-    let names = [["pattern.svg", "pattern.dxf", "job.nc"]]
+    let names = FILES[OWN_FILES..SURFACE_FILES].chunks_exact(FILES_A_SHEET);
+    for (((CutResult { gcode, .. }, drawing), sheet), names) in jobs
         .into_iter()
-        .chain(
-            FILES[OWN_FILES..SURFACE_FILES]
-                .chunks_exact(FILES_A_SHEET)
-                .map(|c| [c[0], c[1], c[2]]),
-        );
-    let cut = jobs.into_iter().zip(drawn_sheets).zip(&shape.sheets);
-    for (((CutResult { gcode, .. }, drawing), sheet), name) in cut.zip(names) {
-        files.push((name[0], drawing.svg.into_bytes()));
-        files.push((name[1], pattern::dxf(sheet).into_bytes()));
-        files.push((name[2], gcode.into_bytes()));
+        .zip(drawn_sheets)
+        .zip(&shape.sheets)
+        .zip(names)
+    {
+        files.push((names[0], drawing.svg.into_bytes()));
+        files.push((names[1], pattern::dxf(sheet).into_bytes()));
+        files.push((names[2], gcode.into_bytes()));
     }
     // Only a linkage too large for the format has none.
     let opened = write_glb(&shape.linkage, &[&shape.first().positions]);

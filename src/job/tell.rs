@@ -6,7 +6,7 @@ use super::cut::CutResult;
 use super::design::Design;
 use super::load::Loaded;
 use super::maps::Ground;
-use super::shape::Shape;
+use super::shape::{Fit, Shape};
 use super::targets::Targets;
 use super::verdict::place;
 use crate::base::units::short;
@@ -14,7 +14,7 @@ use crate::conformal::Dart;
 use crate::machine::Machine;
 use crate::material::{Material, Source as SigmaSource};
 use crate::mesh::VertexId;
-use crate::pattern::{Figures, Sheet};
+use crate::pattern::{Figures, HingeRisk, Sheet};
 
 /// What does not forbid the cut but should be known before it.
 pub(crate) fn warnings(
@@ -106,6 +106,21 @@ pub(crate) fn warnings(
         warnings.push(seams(shape));
     }
     warnings
+}
+
+/// Says so where folds strain hinges beyond what stretching a flat one to σ would.
+pub(crate) fn risk(fit: &Fit, risks: &[HingeRisk]) -> Option<String> {
+    let beyond = risks.iter().filter(|r| r.share > 1.0).count();
+    let worst = risks.iter().max_by(|a, b| a.share.total_cmp(&b.share))?;
+    let at = fit.positions.get(worst.point as usize)?;
+    (beyond > 0).then(|| {
+        format!(
+            "at {} the fold between the triangles adds to the stretch, up to {} times the strain of a flat hinge at σ, most near {}: open the sheet there with care, or make the triangles larger or the hinges narrower",
+            if beyond == 1 { "1 hinge".to_owned() } else { format!("{beyond} hinges") },
+            short(worst.share, 2),
+            place(*at)
+        )
+    })
 }
 
 /// What there is to join, and how.

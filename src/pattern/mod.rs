@@ -11,6 +11,7 @@ mod check;
 mod contour;
 mod dxf;
 mod font;
+mod ligament;
 mod mark;
 mod marks;
 mod nest;
@@ -25,6 +26,7 @@ mod template;
 
 pub use dxf::dxf;
 pub use font::{can_write, width_mm};
+pub use ligament::{HingeRisk, Ligament, PIVOT_IN_NECKS, hinge_risks};
 pub use mark::{Label, Mark, MarkKind};
 pub use marks::{MarkOptions, marks};
 pub use nest::{Nested, StockArea, fits_stock, nest};

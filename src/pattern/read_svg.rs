@@ -313,9 +313,10 @@ struct State {
 fn property<'a>(node: Node<'a>, name: &str) -> Option<&'a str> {
     let in_style = node.attribute("style").and_then(|style| {
         let all = style.split(';').filter_map(|p| p.split_once(':'));
-        all.filter(|(key, _)| key.trim() == name)
+        // The last one of a name holds.
+        all.rev()
+            .find(|(key, _)| key.trim() == name)
             .map(|(_, value)| value.trim())
-            .next_back()
     });
     in_style.or_else(|| node.attribute(name))
 }

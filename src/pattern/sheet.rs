@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use kurbo::{Point, Rect, Vec2};
 
 use super::contour;
+use super::ligament::Ligament;
 use super::mark::Mark;
 use super::star;
 use crate::base::curve::Curve;
@@ -114,6 +115,22 @@ impl SheetOptions {
             corner_radius_mm: 0.0,
             alignment_hole_mm: 0.0,
         }
+    }
+
+    /// The numbers that go with a sheet of triangles of this edge.
+    pub fn metadata(&self, edge_mm: f64) -> SheetMetadata {
+        SheetMetadata {
+            hinge_width_mm: self.hinge_width_mm,
+            kerf_mm: self.kerf_mm,
+            edge_mm,
+            tip: self.tip,
+            corner_radius_mm: self.corner_radius_mm,
+        }
+    }
+
+    /// The ligaments of such a sheet, of this thickness.
+    pub fn ligament(&self, edge_mm: f64, thickness_mm: f64) -> Ligament {
+        Ligament::of(&self.metadata(edge_mm), thickness_mm)
     }
 }
 
@@ -431,13 +448,7 @@ impl Sheet {
         flaps: &Flaps,
         options: &SheetOptions,
     ) -> Result<Self, PatternError> {
-        let metadata = SheetMetadata {
-            hinge_width_mm: options.hinge_width_mm,
-            kerf_mm: options.kerf_mm,
-            edge_mm: linkage.edge_mm,
-            tip: options.tip,
-            corner_radius_mm: options.corner_radius_mm,
-        };
+        let metadata = options.metadata(linkage.edge_mm);
         metadata.check()?;
         if linkage.triangles.is_empty() {
             return Err(PatternError::Empty);

@@ -129,6 +129,21 @@ impl Corridor {
 pub(crate) struct Bed {
     burns: Vec<Burn>,
     open: Option<Burn>,
+    /// The output is above zero.
+    glows: bool,
+    /// How often it has become so.
+    periods: usize,
+    /// Time within burns at which the output was zero already, s.
+    dark_s: f64,
+}
+
+/// How long and how often the output was above zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BeamTime {
+    /// Time, s. With M4 the output is zero a little before each stop, where a burn still goes on.
+    pub on_s: f64,
+    /// How often it was switched on.
+    pub periods: usize,
 }
 
 /// What the beam is told to do.
@@ -162,6 +177,8 @@ impl Bed {
                 self.burns.push(burn);
             }
         }
+        self.periods += usize::from(light.on() && !self.glows);
+        self.glows = light.on();
         if light.on() {
             self.open = Some(Burn {
                 from_mm: at,
@@ -178,6 +195,24 @@ impl Bed {
     /// True if the beam is on.
     pub fn lit(&self) -> bool {
         self.open.is_some()
+    }
+
+    /// The output was zero already during the last moments of what ends now.
+    pub fn faded(&mut self, dark_s: f64) {
+        if self.glows {
+            self.dark_s += dark_s;
+            self.glows = false;
+        }
+    }
+
+    /// How long and how often the output was above zero until now.
+    pub fn beam_time(&self, now_s: f64) -> BeamTime {
+        let open = self.open.map_or(0.0, |b| now_s - b.start_s);
+        let closed: f64 = self.burns.iter().map(|b| b.end_s - b.start_s).sum();
+        BeamTime {
+            on_s: (closed + open - self.dark_s).max(0.0),
+            periods: self.periods,
+        }
     }
 
     /// The S word of the beam, 0 if it is off.

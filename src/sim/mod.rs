@@ -8,6 +8,7 @@
 
 pub mod burnt;
 pub mod controller;
+mod estimate;
 mod link;
 mod modal;
 pub mod pty;
@@ -15,8 +16,9 @@ mod rehearse;
 mod settings;
 mod words;
 
-pub use burnt::{Burn, Stroke, strokes};
+pub use burnt::{BeamTime, Burn, Stroke, strokes};
 pub use controller::{Controller, State};
+pub use estimate::{EstimateError, estimate};
 pub use link::{Faults, SimTransport};
 pub use modal::Spindle;
 pub use rehearse::{Rehearsal, RehearsalError, RehearsalSummary, rehearse};

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use super::burnt::{Burn, Stroke, strokes};
+use super::burnt::{BeamTime, Burn, Stroke, strokes};
 use super::controller::Controller;
 use super::link::SimTransport;
 use super::settings::Settings;
@@ -20,6 +20,10 @@ pub struct Rehearsal {
     pub strokes: Vec<Stroke>,
     /// How long the machine took, s.
     pub time_s: f64,
+    /// From the first motion to the last, s.
+    pub motion_s: f64,
+    /// How long and how often the beam was on.
+    pub beam: BeamTime,
     /// What the sender reports.
     pub report: SendReport,
     /// The figures that a person wants.
@@ -56,7 +60,7 @@ impl RehearsalSummary {
         Self {
             strokes: strokes(&burns, tolerance_mm).len(),
             burnt_mm: total(&Burn::length_mm),
-            beam_on_s: total(&time),
+            beam_on_s: controller.beam_time().on_s,
             standing_burn_s: total(&|b| if b.standing() { time(b) } else { 0.0 }),
             rapid_burn_mm: total(&|b| if b.rapid { b.length_mm() } else { 0.0 }),
             beam_on_at_end: controller.beam_on(),
@@ -104,6 +108,8 @@ pub fn rehearse(
         strokes: strokes(&burns, step_mm(settings)),
         burns,
         time_s: report.time_s,
+        motion_s: controller.motion_s(),
+        beam: controller.beam_time(),
         report,
         summary: RehearsalSummary::of(&controller),
     })

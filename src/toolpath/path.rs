@@ -2,6 +2,7 @@
 
 use kurbo::Point;
 
+use super::order::Heat;
 use super::scrap::Scrap;
 use super::{kerf, order, star};
 use crate::base::curve::{Curve, Piece};
@@ -290,6 +291,8 @@ pub struct CutOptions {
     pub overcut_mm: f64,
     /// Slower corners.
     pub corner: Option<CornerSlowdown>,
+    /// What it costs to cut close to the cuts just made.
+    pub heat: Heat,
     /// Speed (mm/min) and power (per cent) for marks; without them none are engraved.
     pub engrave: Option<(f64, f64)>,
 }
@@ -312,6 +315,7 @@ impl CutOptions {
                 distance_mm: c.distance_mm,
                 percent: c.percent,
             }),
+            heat: Heat::NONE,
             engrave: marks.map(|m| (m.speed_mm_per_min, m.power_percent)),
         }
     }
@@ -427,7 +431,7 @@ impl Planner<'_> {
             return;
         };
         let lines: Vec<Curve> = sheet.marks.iter().flat_map(|m| m.strokes()).collect();
-        for (line, reversed) in ordered(&lines, self.at, false, None) {
+        for (line, reversed) in ordered(&lines, self.at, false, None, Heat::NONE) {
             let line = if reversed {
                 lines[line].reversed()
             } else {
@@ -479,7 +483,7 @@ impl Planner<'_> {
         };
         let returns = passes.is_multiple_of(2);
         for _ in 0..rounds {
-            for (n, reversed) in ordered(&lines, self.at, returns, pierce_mm) {
+            for (n, reversed) in ordered(&lines, self.at, returns, pierce_mm, self.options.heat) {
                 let line = if reversed {
                     lines[n].reversed()
                 } else {
@@ -523,7 +527,7 @@ impl Planner<'_> {
                 self.lead(ways.lead_in, ways.lead_out);
             }
             for stretch in stretches {
-                let way_in = scrap.way_in(&stretch, self.options, kerf_mm)?;
+                let (way_in, stretch) = scrap.way_in(stretch, self.options, kerf_mm)?;
                 self.push(role, stretch, self.options.passes);
                 self.lead(way_in, None);
             }
@@ -552,6 +556,7 @@ fn ordered(
     head: Point,
     returns: bool,
     pierce_mm: Option<f64>,
+    heat: Heat,
 ) -> Vec<(usize, bool)> {
     let ends: Vec<[Point; 2]> = lines
         .iter()
@@ -560,7 +565,7 @@ fn ordered(
             if pierce_mm.is_some() { [a, a] } else { [a, b] }
         })
         .collect();
-    let mut order = order::order(&ends, head, returns);
+    let mut order = order::order_strokes(&ends, head, returns, heat);
     if pierce_mm.is_some() {
         order.iter_mut().for_each(|o| o.1 = false);
     }

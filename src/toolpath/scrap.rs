@@ -13,8 +13,9 @@ use super::path::{CutOptions, ToolpathError};
 use crate::base::curve::{Curve, Piece, Vertex};
 use crate::pattern::{Contour, Sheet};
 
-/// Angle between a lead and the cut, radians.
-const SLANT: f64 = std::f64::consts::FRAC_PI_3;
+/// Angles between a lead and the cut that are tried, radians: a slant leaves the least mark, straight on needs the least
+/// room along the rim.
+const SLANTS: [f64; 4] = [1.05, std::f64::consts::FRAC_PI_2, 0.7, 2.1];
 
 /// Kept between a pierce hole and the finished part, millimetres.
 const CLEAR_MM: f64 = 0.05;
@@ -129,15 +130,17 @@ impl Scrap {
         }
         // Straight pieces, nearest middle first.
         let mut pieces: Vec<(usize, Piece)> = outline.pieces().enumerate().collect();
-        pieces.retain(|(_, p)| p.bulge == 0.0 || p.arc().is_some_and(|a| a.radius > 2.0 * kerf_mm));
         pieces.sort_by(|a, b| {
+            let small = |p: &Piece| p.arc().is_some_and(|a| a.radius <= 2.0 * kerf_mm);
             let d = |p: &Piece| p.at(0.5).distance_squared(head);
-            d(&a.1).total_cmp(&d(&b.1))
+            small(&a.1)
+                .cmp(&small(&b.1))
+                .then(d(&a.1).total_cmp(&d(&b.1)))
         });
-        for length in lengths(options, kerf_mm) {
+        for (slant, length) in ways(options, kerf_mm) {
             for (index, piece) in &pieces {
                 let (at, along) = (piece.at(0.5), piece.direction(0.5));
-                let pierce = at + lead(along, true) * length;
+                let pierce = at + lead(along, slant, 1.0) * length;
                 if self.is_free(pierce, at, options.pierce_mm, kerf_mm) {
                     let line = outline.opened_at(*index, 0.5);
                     let lead_out = self.leave(&line, along, options, kerf_mm);
@@ -160,33 +163,38 @@ impl Scrap {
         })
     }
 
-    /// The way into the start of a stretch between two tabs.
+    /// The way into a stretch between two tabs, and the stretch itself: the other way round where only its end can be
+    /// reached.
     ///
     /// # Errors
-    /// [`ToolpathError::NoRoomToPierce`] if the hole is wide and fits nowhere.
+    /// [`ToolpathError::NoRoomToPierce`] if the hole is wide and fits at neither end.
     pub fn way_in(
         &self,
-        line: &Curve,
+        line: Curve,
         options: &CutOptions,
         kerf_mm: f64,
-    ) -> Result<Option<Curve>, ToolpathError> {
+    ) -> Result<(Option<Curve>, Curve), ToolpathError> {
         let wide = options.pierce_mm > kerf_mm;
-        let Some(first) = line
-            .pieces()
-            .next()
-            .filter(|_| wide || options.lead_in_mm > 0.0)
-        else {
-            return Ok(None);
-        };
-        let found = lengths(options, kerf_mm).into_iter().find_map(|length| {
-            let pierce = first.from + lead(first.direction(0.0), true) * length;
-            let free = self.is_free(pierce, first.from, options.pierce_mm, kerf_mm);
-            free.then(|| Curve::line(pierce, first.from))
-        });
-        if found.is_none() && wide {
-            return Err(no_room(first.from, options));
+        if !wide && options.lead_in_mm <= 0.0 {
+            return Ok((None, line));
         }
-        Ok(found)
+        let back = line.reversed();
+        for (slant, length) in ways(options, kerf_mm) {
+            // Scrap is on the right of the outline, and on the left of the way back.
+            for (line, side) in [(&line, 1.0), (&back, -1.0)] {
+                let Some(first) = line.pieces().next() else {
+                    continue;
+                };
+                let pierce = first.from + lead(first.direction(0.0), slant, side) * length;
+                if self.is_free(pierce, first.from, options.pierce_mm, kerf_mm) {
+                    return Ok((Some(Curve::line(pierce, first.from)), line.clone()));
+                }
+            }
+        }
+        if wide {
+            return Err(no_room(line.start().unwrap_or(Point::ORIGIN), options));
+        }
+        Ok((None, line))
     }
 
     /// Overcut along the line's beginning, then away from the part.
@@ -208,8 +216,12 @@ impl Scrap {
             None => (line.end()?, along),
         };
         if options.lead_out_mm > 0.0 {
-            let out = end + lead(along, false) * options.lead_out_mm;
-            if self.is_free(out, end, kerf_mm, kerf_mm) {
+            // The way in, mirrored.
+            let found = SLANTS.iter().find_map(|slant| {
+                let out = end - lead(along, *slant, -1.0) * options.lead_out_mm;
+                self.is_free(out, end, kerf_mm, kerf_mm).then_some(out)
+            });
+            if let Some(out) = found {
                 way.join(&Curve::line(end, out));
             }
         }
@@ -261,16 +273,22 @@ fn no_room(at: Point, options: &CutOptions) -> ToolpathError {
     }
 }
 
-/// Lengths of a lead-in that are tried: as asked, and shorter down to what the hole needs.
-fn lengths(options: &CutOptions, kerf_mm: f64) -> [f64; 3] {
-    let least = (0.5 * (options.pierce_mm - kerf_mm) + 2.0 * CLEAR_MM) / SLANT.sin();
-    let length = options.lead_in_mm.max(least);
-    [length, 0.5 * (length + least), least]
+/// Slants and lengths of a lead-in that are tried: as long as asked first, and shorter down to what the hole needs.
+fn ways(options: &CutOptions, kerf_mm: f64) -> Vec<(f64, f64)> {
+    let mut all = Vec::with_capacity(12);
+    for share in [1.0, 0.5, 0.0] {
+        for slant in SLANTS {
+            let least = (0.5 * (options.pierce_mm - kerf_mm) + 2.0 * CLEAR_MM) / slant.sin();
+            let most = options.lead_in_mm.max(least);
+            all.push((slant, least + share * (most - least)));
+        }
+    }
+    all
 }
 
-/// From the outline into the scrap on its right: back to where a lead-in comes from, or on to where a lead-out goes.
-fn lead(along: Vec2, back: bool) -> Vec2 {
+/// From the outline back into the scrap where a lead-in comes from: on the right of the direction `along` for a `side` of
+/// 1, on its left for −1.
+fn lead(along: Vec2, slant: f64, side: f64) -> Vec2 {
     let right = Vec2::new(along.y, -along.x);
-    let sign = if back { -1.0 } else { 1.0 };
-    right * SLANT.sin() + along * (sign * SLANT.cos())
+    right * (side * slant.sin()) - along * slant.cos()
 }

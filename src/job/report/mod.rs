@@ -28,6 +28,7 @@ use crate::base::units::short;
 use crate::conformal::Layout;
 use crate::linkage::Linkage;
 use crate::mesh::{Surface, VertexId};
+use crate::pattern::HingeRisk;
 use views::{Named, Style};
 
 /// All that the page shows.
@@ -79,6 +80,8 @@ pub struct Pose<'a> {
     pub positions: &'a [Point3<f64>],
     /// How far they are from the surface, in L, by point.
     pub distances_in_l: &'a [f64],
+    /// How much of what the material bears every hinge uses.
+    pub risks: &'a [HingeRisk],
     /// λ at every hinge.
     pub openings: &'a [f64],
 }
@@ -116,6 +119,12 @@ pub fn html(page: &Page<'_>) -> String {
         stretch(&mut out, &map, &places);
         linkage(&mut out, page, pose, &places);
         hinges(&mut out, page, pose);
+        risks(
+            &mut out,
+            page,
+            pose,
+            &views::around(View::front(pose.surface)),
+        );
     }
     sheet(&mut out, page);
     toolpath(&mut out, page);
@@ -315,6 +324,60 @@ fn hinges(out: &mut String, page: &Page<'_>, pose: &Pose<'_>) {
         "<section><h2>Hinges</h2><p class=\"lead\">How far each of the {} hinges is open, from closed (1) to the limit of the material (σ).</p><figure>{}</figure></section>",
         pose.openings.len(),
         histogram(pose.openings, &scale)
+    );
+}
+
+/// Hinges in the table of those at most risk.
+const RISKS_SHOWN: usize = 5;
+
+fn risks(out: &mut String, page: &Page<'_>, pose: &Pose<'_>, around: &[Named]) {
+    let mut worst: Vec<&HingeRisk> = pose.risks.iter().filter(|r| r.share.is_finite()).collect();
+    if worst.is_empty() || !page.sigma.is_finite() {
+        return;
+    }
+    let mut values = vec![0.0; pose.positions.len()];
+    for risk in &worst {
+        if let Some(value) = values.get_mut(risk.point as usize) {
+            *value = risk.share;
+        }
+    }
+    worst.sort_by(|a, b| b.share.total_cmp(&a.share).then(a.hinge.cmp(&b.hinge)));
+    let scale = ColourScale::distance(1.0);
+    let scene = Scene::linkage_by_value(page.linkage, pose.positions, &values, &scale);
+    let numbered: Vec<(usize, Point3<f64>)> = worst
+        .iter()
+        .take(RISKS_SHOWN)
+        .enumerate()
+        .filter_map(|(n, r)| Some((n + 1, *pose.positions.get(r.point as usize)?)))
+        .collect();
+    let rows: String = worst
+        .iter()
+        .take(RISKS_SHOWN)
+        .enumerate()
+        .map(|(n, r)| {
+            format!(
+                "<tr><td>{}</td><td>{}</td><td>{}°</td><td>{}</td></tr>",
+                n + 1,
+                short(r.opening, 3),
+                short(r.fold_deg, 1),
+                short(r.share, 2)
+            )
+        })
+        .collect();
+    let _ = write!(
+        out,
+        "<section><h2>Hinges at risk</h2><p class=\"lead\">Nominal strain of the ligaments, from their opening and from the fold between their triangles, as a share of a flat hinge's at σ. Watch the numbered ones when you open the sheet.</p><div class=\"key\">{}</div><div class=\"grid\">{}</div><table><tr><th>place</th><th>open λ</th><th>fold</th><th>share</th></tr>{rows}</table></section>",
+        legend(&scale, "", "", "more than a flat hinge bears at σ"),
+        views::figures(
+            &scene,
+            "strain of the hinges",
+            around,
+            Style {
+                size: VIEW_SIZE,
+                shade_mm: 0.0,
+            },
+            &numbered
+        )
     );
 }
 

@@ -76,6 +76,14 @@ fn with_page<T>(full: bool, then: impl FnOnce(&Page<'_>) -> T) -> T {
         svg: SHEET.into(),
         toolpath: strokes.to_vec(),
     }];
+    let risks = [HingeRisk {
+        hinge: 0,
+        point: 0,
+        opening: 1.2,
+        fold_deg: 3.0,
+        strain: 0.1,
+        share: 0.5,
+    }];
     let pose = Pose {
         name: "dish",
         surface: &job.surface,
@@ -83,6 +91,7 @@ fn with_page<T>(full: bool, then: impl FnOnce(&Page<'_>) -> T) -> T {
         positions: &job.built.start,
         distances_in_l: &vec![0.01; job.built.start.len()],
         openings: &vec![1.2; job.built.linkage.hinges.len()],
+        risks: &risks,
     };
     then(&Page {
         title: "dish & \"bowl\" <1>",
@@ -129,6 +138,8 @@ fn a_passed_job_shows_every_section_balanced_and_escaped() {
         "<h2>The opened sheet</h2>",
         "<h2>Distance from the surface</h2>",
         "<h2>Hinges</h2>",
+        "<h2>Hinges at risk</h2>",
+        "<td>0.5</td>",
         "<h2>The sheet</h2>",
         "<h2>Order of cutting</h2>",
         "<h2>All figures</h2>",
@@ -140,7 +151,7 @@ fn a_passed_job_shows_every_section_balanced_and_escaped() {
     assert!(!html.contains("<?xml"));
     assert_eq!(
         html.matches("<img src=\"data:image/png;base64,").count(),
-        1 + 3 + 2 + 3
+        1 + 3 + 2 + 3 + 3
     );
 }
 
@@ -150,7 +161,7 @@ fn a_failed_job_has_rings_and_neither_sheet_nor_toolpath() {
     assert_balanced(&html);
     assert!(html.contains("verdict fail"));
     assert!(!html.contains("<h2>The sheet</h2>") && !html.contains("<h2>Order of cutting</h2>"));
-    assert_eq!(html.matches("aria-hidden").count(), 3 + 2 + 3);
+    assert_eq!(html.matches("aria-hidden").count(), 3 + 2 + 3 + 3);
 }
 
 #[test]
@@ -202,6 +213,9 @@ fn every_surface_is_shown_with_its_own_places() {
     assert!(first.contains("On dish"));
     let pictures = |part: &str| part.matches("<img").count();
     assert_eq!(pictures(first), pictures(second));
+    // The hinges at risk have rings of their own on both.
+    let (first, _) = first.split_once("<h2>Hinges at risk").unwrap();
+    let (second, _) = second.split_once("<h2>Hinges at risk").unwrap();
     assert!(!first.contains("<circle cx"), "no ring on the first");
     assert!(second.contains("<circle cx"));
 }

@@ -15,10 +15,10 @@ mod tests;
 
 use std::collections::VecDeque;
 
-use super::burnt::{Bed, Burn, Light};
+use super::burnt::{BeamTime, Bed, Burn, Light};
 use super::modal::{Action, Arc, Drive, Modal, Spindle, interpret};
 use super::settings::Settings;
-use crate::planner::{Move, Profile, Queue};
+use crate::planner::{Move, Profile, Queue, READING_AT_REST, dark_before_stop_s};
 
 /// What the controller says it is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +66,8 @@ struct Cut {
 struct Running {
     profile: Profile,
     start_s: f64,
+    /// When the block began, s: earlier than `start_s` once its profile has been planned anew.
+    block_start_s: f64,
     /// Length of the block already behind when `profile` began, mm.
     behind_mm: f64,
 }
@@ -115,6 +117,8 @@ pub struct Controller {
     zero: [f64; 3],
     soft_limit_hit: bool,
     held_since_s: f64,
+    /// When something moved first and last.
+    motion_s: Option<[f64; 2]>,
     // The beam.
     bed: Bed,
     at_rest: Light,
@@ -155,6 +159,7 @@ impl Controller {
             zero: [0.0; 3],
             soft_limit_hit: false,
             held_since_s: 0.0,
+            motion_s: None,
             bed: Bed::default(),
             at_rest: Light::DARK,
             before_hold: Light::DARK,
@@ -201,6 +206,17 @@ impl Controller {
     /// Everything that was burnt until now, in order.
     pub fn burns(&self) -> Vec<Burn> {
         self.bed.burns(self.now_s, self.head_mm())
+    }
+
+    /// From the beginning of the first motion to the end of the last block so far, s.
+    pub fn motion_s(&self) -> f64 {
+        self.motion_s
+            .map_or(0.0, |[first_s, last_s]| last_s - first_s)
+    }
+
+    /// How long and how often the beam was on until now.
+    pub fn beam_time(&self) -> BeamTime {
+        self.bed.beam_time(self.now_s)
     }
 
     /// Bytes that found the receive buffer full, or the controller deaf. Real firmware does not know this number.
@@ -456,7 +472,13 @@ impl Controller {
             progress = true;
             if self.take_byte(byte) {
                 let bytes = self.ready.as_ref().map_or(0, |line| line.bytes);
-                self.busy_until_s = self.now_s + f64::from(bytes) * self.settings.byte_time_s;
+                let share = if self.running.is_none() {
+                    READING_AT_REST
+                } else {
+                    1.0
+                };
+                self.busy_until_s =
+                    self.now_s + f64::from(bytes) * self.settings.byte_time_s * share;
                 return true;
             }
         }
@@ -688,9 +710,15 @@ impl Controller {
 
     /// The first block's profile from now, `behind_mm` of it already done.
     fn begin_block(&mut self, behind_mm: f64) {
+        self.motion_s.get_or_insert([self.now_s; 2]);
+        let block_start_s = match &self.running {
+            Some(running) => running.block_start_s,
+            None => self.now_s,
+        };
         self.running = self.queue.front_profile().map(|profile| Running {
             profile,
             start_s: self.now_s,
+            block_start_s,
             behind_mm,
         });
     }
@@ -727,6 +755,9 @@ impl Controller {
 
     /// The running profile has ended: on to the next block, or to rest.
     fn block_ends(&mut self, running: Running) {
+        if let Some([_, last_s]) = &mut self.motion_s {
+            *last_s = self.now_s;
+        }
         let exit = running.profile.exit_mm_s();
         let Some((_, cut)) = self.queue.front() else {
             self.running = None;
@@ -746,6 +777,16 @@ impl Controller {
             self.held();
             return;
         }
+        if exit == 0.0 && cut.drive.spindle == Spindle::Dynamic && self.settings.laser_mode {
+            let steps = (0..3).map(|k| {
+                (cut.end[k] - cut.start[k]).abs() / cut.length_mm * self.settings.steps_per_mm[k]
+            });
+            self.bed.faded(dark_before_stop_s(
+                &running.profile,
+                running.start_s - running.block_start_s,
+                steps.fold(0.0, f64::max),
+            ));
+        }
         self.position = cut.end;
         self.queue.pop();
         self.running = None;
@@ -758,6 +799,7 @@ impl Controller {
                 self.running = Some(Running {
                     profile: Profile::braking(block.length_mm, exit, block.acceleration_mm_s2),
                     start_s: self.now_s,
+                    block_start_s: self.now_s,
                     behind_mm: 0.0,
                 });
                 self.light_block();
@@ -818,6 +860,7 @@ impl Controller {
                     block.acceleration_mm_s2,
                 ),
                 start_s: self.now_s,
+                block_start_s: running.block_start_s,
                 behind_mm,
             });
         }

@@ -1,0 +1,47 @@
+//! The order of strokes: short travel between them, and on demand cool.
+//!
+//! A stroke is entered at one end and left at the other, either way round. The tour starts at the head's position and
+//! ends anywhere: from nearest to nearest first, then improved by exchanges of two and three links towards near
+//! neighbours (S. Lin 1965; D. S. Johnson, L. A. McGeoch 1997); at last small random kicks, each kept only if the
+//! repaired tour is no longer. Seeded, so the same strokes give the same order.
+
+mod heat;
+mod near;
+mod tour;
+
+use kurbo::Point;
+
+pub use heat::{Heat, LOOKBACK, Spacing, spacing};
+use tour::Tour;
+
+/// How often the tour is kicked: more for each stroke of a small set, and in proportion to the strokes of a large one, so
+/// that the time grows with their number. A kick where heat counts takes ten times as long.
+fn kicks(strokes: usize, heat: Heat) -> usize {
+    let (each, few) = if heat.counts() {
+        (2, 6000)
+    } else {
+        (25, 60_000)
+    };
+    few.min(60 * strokes).max(each * strokes)
+}
+
+/// The order of strokes by their two ends (millimetres), each with whether it is reversed, for a head at `start` and with
+/// a price of heat. With `returns`, a stroke ends where it began. Every stroke comes once, and the same strokes always come in
+/// the same order. Near O(n log n).
+pub fn order_strokes(
+    ends: &[[Point; 2]],
+    start: Point,
+    returns: bool,
+    heat: Heat,
+) -> Vec<(usize, bool)> {
+    if ends.is_empty() {
+        return Vec::new();
+    }
+    let mut tour = Tour::new(ends, start, returns, heat);
+    tour.improve();
+    tour.kick(kicks(ends.len(), heat));
+    tour.order()
+}
+
+#[cfg(test)]
+mod tests;
