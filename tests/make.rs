@@ -13,11 +13,13 @@ use std::process::{Command, Output};
 
 use judge::{linkage, sheet};
 
-const ALL: [&str; 7] = [
+const ALL: [&str; 9] = [
     "design.toml",
     "layout.obj",
     "linkage.obj",
+    "linkage.glb",
     "pattern.svg",
+    "pattern.dxf",
     "job.nc",
     "report.json",
     "report.html",
@@ -516,7 +518,7 @@ fn a_bump_without_its_cone_gets_a_report_but_no_job() {
     ] {
         assert!(out.join(name).is_file(), "{name}");
     }
-    for name in ["pattern.svg", "job.nc"] {
+    for name in ["pattern.svg", "pattern.dxf", "job.nc"] {
         assert!(!out.join(name).exists(), "{name}");
     }
     // The edges are exact all the same, which the judge confirms.

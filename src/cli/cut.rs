@@ -17,7 +17,8 @@ use crate::job::{MakeError, cut_drawing};
 
 Slits and contours may be moved, deleted and added in a drawing program: a slit is one straight line from the point where
 its star begins to its hinge. Hinge width, kerf and the shapes of tips and corners are those of the drawing. The job is
-verified against the drawing as it is now and rehearsed, as `kagome make` does.")]
+verified against the drawing as it is now and rehearsed, as `kagome make` does. Where the drawing was moved (--place), or another
+one lies beside the job, the drawing that was cut is written beside it as an SVG of the job's name.")]
 pub struct CutArgs {
     /// The drawing (SVG)
     drawing: PathBuf,
@@ -27,10 +28,10 @@ pub struct CutArgs {
     /// Material profile, by name (see `kagome materials list`) or file
     #[arg(long, value_name = "NAME|FILE", default_value = crate::material::DEFAULT)]
     material: String,
-    /// Move the drawing into the corner of the bed; where it lies then is written beside the job, as SVG of the same name
+    /// Move the drawing into the corner of the bed
     #[arg(long)]
     place: bool,
-    /// The job [default: job.nc beside the drawing]
+    /// The job [default: beside the drawing, job.nc for pattern.svg, else of the drawing's name]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Replace a job that is there already
@@ -44,11 +45,11 @@ pub struct CutArgs {
 /// [`Failure::No`] if the job that was made is not good, [`Failure::Bad`] for a drawing or profiles that cannot be used;
 /// nothing is written then.
 pub fn run(args: &CutArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
-    let output = args
-        .output
-        .clone()
-        .unwrap_or_else(|| args.drawing.with_file_name("job.nc"));
+    let output = args.output.clone().unwrap_or_else(|| job_of(&args.drawing));
     let beside = output.with_extension("svg");
+    // `verify` and `send` must find the drawing that was cut.
+    let found = drawing_of(&output).is_some_and(|d| same(&d, &args.drawing));
+    let copy = args.place || !found;
     if args.place && same(&beside, &args.drawing) {
         return Err(Failure::Bad(format!(
             "the moved drawing would be written over {}; give the job another name (-o)",
@@ -56,7 +57,7 @@ pub fn run(args: &CutArgs, global: &Global, terminal: &Terminal) -> Result<(), F
         )));
     }
     let mut written = vec![&output];
-    written.extend(args.place.then_some(&beside));
+    written.extend(copy.then_some(&beside));
     if let Some(there) = written.iter().find(|p| p.exists()).filter(|_| !args.force) {
         return Err(Failure::Bad(format!(
             "{} exists already; add --force to replace it, or choose another place with -o",
@@ -83,7 +84,7 @@ pub fn run(args: &CutArgs, global: &Global, terminal: &Terminal) -> Result<(), F
             made.objections.join("\n  - ")
         )));
     }
-    if args.place {
+    if copy {
         write_file(&beside, made.drawing.as_bytes()).map_err(Failure::bad)?;
     }
     write_file(&output, made.gcode.as_bytes()).map_err(Failure::bad)?;
@@ -111,20 +112,33 @@ pub fn run(args: &CutArgs, global: &Global, terminal: &Terminal) -> Result<(), F
     ))
 }
 
+/// Where the job of a drawing goes.
+fn job_of(drawing: &Path) -> PathBuf {
+    let name = drawing
+        .file_stem()
+        .map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    match name.strip_prefix("pattern") {
+        Some(number) if number.is_empty() || number.starts_with('-') => {
+            drawing.with_file_name(format!("job{number}.nc"))
+        }
+        _ => drawing.with_extension("nc"),
+    }
+}
+
 fn same(a: &Path, b: &Path) -> bool {
     a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
-/// The drawing that belongs to a job: one of the same name beside it, else the one that `make` writes with it, which is
-/// `pattern.svg` for `job.nc` and `pattern-2.svg` for `job-2.nc`.
-pub(super) fn drawing_of(job: &Path) -> PathBuf {
-    let own = job.with_extension("svg");
-    if own.is_file() {
-        own
-    } else {
-        let name = job.file_stem().map(|s| s.to_string_lossy().into_owned());
-        let number = name.as_deref().and_then(|n| n.strip_prefix("job-"));
-        let number = number.filter(|n| n.chars().all(|c| c.is_ascii_digit()));
-        job.with_file_name(number.map_or("pattern.svg".into(), |n| format!("pattern-{n}.svg")))
-    }
+/// The drawing that belongs to a job, if it is there: one of the same name beside it, else what `make` writes: job.nc goes
+/// with pattern.svg, job-2.nc with pattern-2.svg.
+pub(super) fn drawing_of(job: &Path) -> Option<PathBuf> {
+    let name = job.file_stem()?.to_string_lossy().into_owned();
+    let number = name.strip_prefix("job").unwrap_or("");
+    [
+        job.with_extension("svg"),
+        job.with_file_name(format!("pattern{number}.svg")),
+        job.with_file_name("pattern.svg"),
+    ]
+    .into_iter()
+    .find(|path| path.is_file())
 }

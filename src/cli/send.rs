@@ -63,15 +63,17 @@ pub(super) fn machine_for(asked: Option<&str>, job: &[u8]) -> Result<Option<Mach
 /// The job must be good for the machine, and cut its sheet if the drawing lies beside it: what `verify` would say.
 fn check_job(path: &Path, text: &[u8], machine: &Machine, args: &SendArgs) -> Result<(), Failure> {
     let text = String::from_utf8_lossy(text);
-    let beside = drawing_of(path);
     // Only our own jobs belong to the drawing beside them.
     let ours = gcode::machine_of(&text).is_some();
-    let sheet = match std::fs::read_to_string(&beside) {
-        Ok(drawing) if ours => Some(
-            pattern::read_svg(&drawing)
-                .map_err(|e| Failure::Bad(format!("{}: {e}", beside.display())))?,
-        ),
-        _ => None,
+    let beside = drawing_of(path).filter(|_| ours);
+    let sheet = match &beside {
+        Some(beside) => {
+            let wrong = |e: String| Failure::Bad(format!("{}: {e}", beside.display()));
+            let drawing = std::fs::read_to_string(beside)
+                .map_err(|e| wrong(format!("cannot be read: {e}")))?;
+            Some(pattern::read_svg(&drawing).map_err(|e| wrong(e.to_string()))?)
+        }
+        None => None,
     };
     let verdict = gcode::verify(&text, machine, sheet.as_ref(), None).map_err(Failure::bad)?;
     let findings: Vec<String> = verdict

@@ -47,10 +47,7 @@ pub fn run(args: &VerifyArgs, global: &Global, terminal: &Terminal) -> Result<()
         Some(machine) => machine,
         None => machine::load(machine::DEFAULT).map_err(Failure::bad)?,
     };
-    let sheet_path = args.sheet.clone().or_else(|| {
-        let beside = drawing_of(&args.job);
-        beside.is_file().then_some(beside)
-    });
+    let sheet_path = args.sheet.clone().or_else(|| drawing_of(&args.job));
     let sheet = match &sheet_path {
         None => None,
         Some(path) => Some(

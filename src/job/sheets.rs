@@ -8,7 +8,7 @@ use super::make::title;
 use super::request::{FlapWish, Request};
 use super::shape::Stock;
 use crate::linkage::{Built, Flaps, TriangleId};
-use crate::pattern::{self, Motion, Nested, PatternError, Sheet, StockArea};
+use crate::pattern::{self, MarkOptions, Motion, Nested, PatternError, Sheet, StockArea};
 
 /// Between two parts on one sheet, millimetres, besides four kerfs: room for leads, and for a person's fingers.
 const GAP_MM: f64 = 2.0;
@@ -178,14 +178,16 @@ fn draw(
     request: &Request,
     stock: &Stock<'_>,
 ) -> Result<Sheet, MakeError> {
-    let drawn = Sheet::with_flaps(&built.linkage, flaps, &stock.options);
-    let mut drawn = drawn.map_err(MakeError::Pattern)?;
-    let told = pattern::MarkOptions {
-        name: &title(&request.source),
+    let mut sheet =
+        Sheet::with_flaps(&built.linkage, flaps, &stock.options).map_err(MakeError::Pattern)?;
+    // Of a sample without its parameters.
+    let name = title(&request.source);
+    let told = MarkOptions {
+        name: name.split(':').next().unwrap_or(""),
         back: request.mirror,
     };
-    drawn.marks = pattern::marks(&built.linkage, &drawn, &told);
-    Ok(drawn)
+    sheet.marks = pattern::marks(&built.linkage, &sheet, &told);
+    Ok(sheet)
 }
 
 impl Stock<'_> {

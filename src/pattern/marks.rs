@@ -5,9 +5,9 @@
 //! each triangle around a cone with less than a full turn, a cross around one with more (the paper's Fig. 15). *Name* and
 //! *side*: spelled along rows of triangles, a letter or a few in each.
 //!
-//! A mark lies in the middle part of one triangle, farther from each side than the hinge is wide, so that it weakens
-//! nothing and no slit, contour or ligament can touch it. Text is as large as that part allows; what would be too small to
-//! read is left out.
+//! A mark lies in the middle part of one triangle: away from its sides, and farther from its corners than the ligaments
+//! reach, so that it weakens nothing and touches no slit and no contour. Text is as large as that part allows; what would
+//! be too small to read is left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,6 +18,7 @@ use super::mark::{Label, Mark, MarkKind};
 use super::sheet::{Sheet, flat_vertices};
 use crate::base::curve::Curve;
 use crate::base::ids::{Id as _, Per};
+use crate::base::union::Union;
 use crate::linkage::{Colour, Linkage, TriangleId};
 
 /// Smaller text is not read any more, millimetres.
@@ -38,6 +39,9 @@ const MOST_RINGS: usize = 3;
 /// Largest radius of a cone's ring, millimetres.
 const LARGEST_RING_MM: f64 = 2.0;
 
+/// Part of a hinge's width that stays free beside slits and contours.
+const BESIDE: f64 = 0.3;
+
 /// Positions that are tried for a mark on either side of a triangle's centre.
 const STEPS: i32 = 24;
 
@@ -50,12 +54,15 @@ pub struct MarkOptions<'a> {
     pub back: bool,
 }
 
+/// A direction, and for every triangle the next one that way.
+type Rows = Option<(Vec2, Vec<Option<TriangleId>>)>;
+
 type Sides = Per<TriangleId, [Option<(TriangleId, usize)>; 3]>;
 
 /// The marks of a sheet that was made of this linkage, in the same frame.
 pub fn marks(linkage: &Linkage, sheet: &Sheet, options: &MarkOptions<'_>) -> Vec<Mark> {
     let mut marker = Marker::new(linkage, sheet);
-    if marker.room_mm <= 0.0 {
+    if marker.room_mm <= 0.0 || marker.corner_room_mm <= 0.0 {
         return Vec::new();
     }
     let all = linkage.neighbours();
@@ -68,8 +75,20 @@ pub fn marks(linkage: &Linkage, sheet: &Sheet, options: &MarkOptions<'_>) -> Vec
         .filter(|c| font::can_write(&c.to_string()))
         .take(MOST_LETTERS)
         .collect();
-    marker.text(name.trim(), MarkKind::Name);
-    marker.text(if options.back { "BACK" } else { "FRONT" }, MarkKind::Side);
+    let parts = marker.parts();
+    let rows = marker.rows();
+    for (n, part) in parts.iter().enumerate() {
+        // Of several parts each has a number.
+        let number = if parts.len() > 1 {
+            format!(" {}", n + 1)
+        } else {
+            String::new()
+        };
+        let name = format!("{}{number}", name.trim());
+        marker.text(name.trim(), MarkKind::Name, part, &rows);
+        let side = if options.back { "BACK" } else { "FRONT" };
+        marker.text(side, MarkKind::Side, part, &rows);
+    }
     marker.marks
 }
 
@@ -112,24 +131,31 @@ struct Marker<'a> {
     used: Vec<bool>,
     /// Radius of the hole in a triangle's middle.
     holes: Vec<f64>,
-    /// Radius of the largest circle in the part of a triangle that may be engraved.
+    /// From a triangle's middle to where a mark may reach towards its sides and its corners.
     room_mm: f64,
-    hinge_width_mm: f64,
+    corner_room_mm: f64,
+    /// From the edge of a cut to where a mark may begin.
+    beside_mm: f64,
     marks: Vec<Mark>,
 }
 
 impl<'a> Marker<'a> {
     fn new(linkage: &'a Linkage, sheet: &Sheet) -> Self {
         let meta = &sheet.metadata;
-        let half = 0.5 * meta.kerf_mm;
-        let clear = meta.hinge_width_mm + half + meta.tip.radius_mm(meta.kerf_mm);
+        // What engraves is about as wide as what cuts.
+        let beside = BESIDE * meta.hinge_width_mm + 0.5 * meta.kerf_mm;
+        // Ligaments lie within the neck; wide tips reach beyond it.
+        let tip = meta.tip.radius_mm(0.0);
+        let around = if tip > 0.0 { tip + beside } else { 0.0 };
+        let corner = meta.neck_mm() + around.max(0.5 * meta.kerf_mm);
         let mut marker = Self {
             linkage,
             flat: linkage.flat_neighbours(),
             used: vec![false; linkage.triangles.len()],
             holes: vec![0.0; linkage.triangles.len()],
-            room_mm: linkage.edge_mm / 12f64.sqrt() - clear,
-            hinge_width_mm: meta.hinge_width_mm,
+            room_mm: linkage.edge_mm / 12f64.sqrt() - beside - 0.5 * meta.kerf_mm,
+            corner_room_mm: linkage.edge_mm / 3f64.sqrt() - corner,
+            beside_mm: beside,
             marks: Vec::new(),
         };
         let round = sheet.contours.iter().filter_map(|c| {
@@ -168,24 +194,29 @@ impl<'a> Marker<'a> {
     fn place(&self, t: TriangleId, up: Vec2, form: &Form) -> Option<(Point, f64)> {
         let right = Vec2::new(up.y, -up.x);
         let corners = self.corners(t);
-        let sides: [(f64, f64); 3] = std::array::from_fn(|k| {
-            let side = corners[(k + 1) % 3] - corners[k];
-            let out = Vec2::new(side.y, -side.x) / side.hypot();
+        let middle = self.middle(t);
+        // Towards each side and each corner: how the way there leans, how far the form reaches, and what room there is.
+        let limits: [(f64, f64, f64); 6] = std::array::from_fn(|k| {
+            let side = corners[(k + 1) % 3] - corners[k % 3];
+            let (out, room) = if k < 3 {
+                (Vec2::new(side.y, -side.x), self.room_mm)
+            } else {
+                (corners[k % 3] - middle, self.corner_room_mm)
+            };
+            let out = out / out.hypot();
             let reach = |p: &Vec2| (right * p.x + up * p.y).dot(out);
-            (
-                out.dot(up),
-                form.hull.iter().map(reach).fold(f64::MIN, f64::max),
-            )
+            let reach = form.hull.iter().map(reach).fold(f64::MIN, f64::max);
+            (out.dot(up), reach.max(1e-9), room)
         });
         let (low, high) = form.height();
         let hole = self.holes[t.index()];
-        let keep = hole + self.hinge_width_mm;
+        let keep = hole + self.beside_mm;
         let mut best: Option<(f64, f64)> = None;
         for step in -STEPS..=STEPS {
             let at = 1.5 * self.room_mm * f64::from(step) / f64::from(STEPS);
             let mut height = LARGEST_TEXT_MM;
-            for (slope, reach) in sides {
-                height = height.min((self.room_mm - at * slope) / reach.max(1e-9));
+            for (slope, reach, room) in limits {
+                height = height.min((room - at * slope) / reach);
             }
             if hole > 0.0 {
                 // Above the hole or below it.
@@ -197,7 +228,7 @@ impl<'a> Marker<'a> {
                 best = Some((at, height));
             }
         }
-        best.map(|(at, height)| (self.middle(t) + up * at, height))
+        best.map(|(at, height)| (middle + up * at, height))
     }
 
     /// Labels along the seams.
@@ -254,7 +285,8 @@ impl<'a> Marker<'a> {
 
     /// Rings and crosses around cones.
     fn cones(&mut self, all: &Sides) {
-        let size = (0.6 * self.room_mm).min(LARGEST_RING_MM);
+        let room = self.room_mm.min(self.corner_room_mm);
+        let size = (0.6 * room).min(LARGEST_RING_MM);
         if 2.0 * size < SMALLEST_TEXT_MM {
             return;
         }
@@ -266,7 +298,7 @@ impl<'a> Marker<'a> {
                 }
                 let at = self.middle(t);
                 let lines = if count < 6 {
-                    vec![Curve::circle(at, size, true)]
+                    vec![Curve::circle(at, size, true).opened_at(0, 0.0)]
                 } else {
                     let d = Vec2::new(size, size) * 0.5f64.sqrt();
                     let e = Vec2::new(-d.y, d.x);
@@ -282,25 +314,25 @@ impl<'a> Marker<'a> {
     }
 
     /// A text along a row of triangles near the middle of the sheet, with as few letters in each as there is room for.
-    fn text(&mut self, text: &str, kind: MarkKind) {
+    fn text(&mut self, text: &str, kind: MarkKind, part: &[TriangleId], rows: &Rows) {
         let letters: Vec<char> = text.chars().collect();
         if letters.is_empty() {
             return;
         }
-        let Some((along, next)) = self.rows() else {
+        let Some((along, next)) = rows else {
             return;
         };
         let up = Vec2::new(-along.y, along.x);
-        let ids = || self.linkage.triangles.ids();
+        let ids = || part.iter().copied();
         let sum = ids().fold(Vec2::ZERO, |s, t| s + self.middle(t).to_vec2());
-        let centre = (sum / self.linkage.triangles.len() as f64).to_point();
+        let centre = (sum / part.len() as f64).to_point();
         for share in [1, 2, 3, letters.len()] {
             let words: Vec<String> = letters.chunks(share).map(|c| c.iter().collect()).collect();
             let form = Form::text(&words[0]);
             let row = |first: TriangleId| -> Option<Vec<TriangleId>> {
                 let mut row = vec![first];
                 while row.len() < words.len() {
-                    row.push(next[row.last()?.index()]?);
+                    row.push(next[row.last()?.index()].filter(|t| self.free(*t))?);
                 }
                 Some(row)
             };
@@ -345,8 +377,23 @@ impl<'a> Marker<'a> {
             && self.holes[t.index()] == 0.0
     }
 
-    /// The lattice direction nearest to X, and for every triangle of one colour the next one that way, if it is free.
-    fn rows(&self) -> Option<(Vec2, Vec<Option<TriangleId>>)> {
+    /// The triangles of each part of the sheet.
+    fn parts(&self) -> Vec<Vec<TriangleId>> {
+        let mut sets = Union::new(self.linkage.triangles.len());
+        for (t, beside) in self.flat.iter_ids() {
+            for (n, _) in beside.iter().flatten() {
+                sets.join(t.index(), n.index());
+            }
+        }
+        let mut parts: BTreeMap<usize, Vec<TriangleId>> = BTreeMap::new();
+        for t in self.linkage.triangles.ids() {
+            parts.entry(sets.root(t.index())).or_default().push(t);
+        }
+        parts.into_values().collect()
+    }
+
+    /// The lattice direction nearest to X, and for every triangle of one colour the next one that way.
+    fn rows(&self) -> Rows {
         let up = |t: &TriangleId| self.linkage.triangles[*t].colour == Colour::Up;
         let first = self.linkage.triangles.ids().find(up)?;
         let corners = self.corners(first);
@@ -360,7 +407,7 @@ impl<'a> Marker<'a> {
             beside
                 .flat_map(|n| self.flat[n.0].iter().flatten())
                 .map(|n| n.0)
-                .find(|&n| self.free(n) && self.middle(n).distance(there) < near)
+                .find(|&n| up(&n) && self.middle(n).distance(there) < near)
         });
         Some((along / along.hypot(), next.collect()))
     }
@@ -573,7 +620,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_engraved_comes_nearer_to_a_cut_or_a_hinge_than_the_hinge_is_wide() {
+    fn nothing_engraved_touches_a_cut_a_contour_or_a_ligament() {
         let machine = machine::load("co2-600x400").unwrap();
         let mut kinds = BTreeSet::new();
         for (linkage, flaps) in sheets() {
@@ -600,8 +647,9 @@ mod tests {
                     let contours: Vec<Curve> =
                         sheet.contours.iter().map(|c| c.line.clone()).collect();
                     let (h, k) = (sheet.metadata.hinge_width_mm, sheet.metadata.kerf_mm);
-                    assert!(apart(&strokes, &slits) >= h + 0.5 * k - 1e-9);
-                    assert!(apart(&strokes, &contours) >= h - 1e-9);
+                    // Beams are half a kerf wide on either side.
+                    assert!(apart(&strokes, &slits) - k >= BESIDE * h - 1e-9);
+                    assert!(apart(&strokes, &contours) - 0.5 * k >= BESIDE * h - 1e-9);
                     // Ligaments lie within the neck of a lattice vertex.
                     let neck = sheet.metadata.neck_mm();
                     for p in strokes.iter().flat_map(|s| s.flattened(1e-2)) {
@@ -696,7 +744,7 @@ mod tests {
         assert_eq!(spelled(&back, MarkKind::Side), "BACK");
         assert_eq!(spelled(&back, MarkKind::Name), "");
         // Triangles too small for any text carry none.
-        let tiny = Linkage::patch(3.0, Handedness::Right, &Linkage::hexagon_cells(5));
+        let tiny = Linkage::patch(2.2, Handedness::Right, &Linkage::hexagon_cells(5));
         let sheet = Sheet::new(&tiny, &SheetOptions::plain(0.7, 0.1)).unwrap();
         assert!(marks(&tiny, &sheet, &MINE).is_empty());
     }

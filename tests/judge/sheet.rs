@@ -14,6 +14,8 @@ pub struct Drawing {
     pub contours: Vec<Vec<P>>,
     pub triangles: Vec<Vec<P>>,
     pub flaps: Vec<Vec<P>>,
+    /// Strokes of everything engraved, in short pieces.
+    pub marks: Vec<[P; 2]>,
     pub kerf: f64,
     pub hinge: f64,
     pub edge: f64,
@@ -36,6 +38,61 @@ fn points(d: &str) -> Vec<P> {
             [x.parse().expect("x"), -y.parse::<f64>().expect("y")]
         })
         .collect()
+}
+
+/// Short pieces of a path that has arcs of circles, each less than half a turn, too; Y up.
+fn pieces(d: &str) -> Vec<[P; 2]> {
+    let mut all = vec![];
+    let (mut at, mut words) = ([0.0; 2], d.split_whitespace());
+    let pair = |w: &str| {
+        let (x, y) = w
+            .trim_start_matches(['M', 'L', 'A'])
+            .split_once(',')
+            .expect("x,y");
+        [x.parse::<f64>().expect("x"), y.parse::<f64>().expect("y")]
+    };
+    while let Some(word) = words.next() {
+        if word == "Z" {
+            continue;
+        }
+        let numbers = pair(word);
+        let to = if word.starts_with('A') {
+            let sweep = words.nth(2).expect("a flag") == "1";
+            let to = pair(words.next().expect("an end"));
+            // The centre is on the right of the chord, as the viewer sees it, where the arc turns with the clock.
+            let (d, r) = ([to[0] - at[0], to[1] - at[1]], numbers[0]);
+            let l = d[0].hypot(d[1]);
+            let reach = (r * r - l * l / 4.0).max(0.0).sqrt() * if sweep { 1.0 } else { -1.0 };
+            let c = [
+                (at[0] + to[0]) / 2.0 - d[1] / l * reach,
+                (at[1] + to[1]) / 2.0 + d[0] / l * reach,
+            ];
+            let angle = |p: P| (p[1] - c[1]).atan2(p[0] - c[0]);
+            let tau = std::f64::consts::TAU;
+            let mut turn = (angle(to) - angle(at)).rem_euclid(tau);
+            if !sweep {
+                turn -= tau;
+            }
+            let (start, from) = (angle(at), at);
+            let point = |k: i32| {
+                let a = start + turn * f64::from(k) / 64.0;
+                if k == 0 {
+                    from
+                } else {
+                    [c[0] + r * a.cos(), c[1] + r * a.sin()]
+                }
+            };
+            all.extend((0..64).map(|k| [point(k), point(k + 1)]));
+            to
+        } else {
+            if word.starts_with('L') {
+                all.push([at, numbers]);
+            }
+            numbers
+        };
+        at = to;
+    }
+    all.iter().map(|s| s.map(|p| [p[0], -p[1]])).collect()
 }
 
 pub fn read_drawing(svg: &str) -> Drawing {
@@ -71,10 +128,22 @@ pub fn read_drawing(svg: &str) -> Drawing {
         contours: group("contour"),
         triangles: triangles.into_iter().map(|e| e.1).collect(),
         flaps: flaps.into_iter().map(|e| e.1).collect(),
+        marks: marks(svg),
         kerf: number("data-kagome-kerf-mm"),
         hinge: number("data-kagome-hinge-width-mm"),
         edge: number("data-kagome-edge-mm"),
     }
+}
+
+fn marks(svg: &str) -> Vec<[P; 2]> {
+    let Some(start) = svg.find("id=\"marks\"") else {
+        return vec![];
+    };
+    let body = svg[start..].split("</g>").next().expect("the group's end");
+    body.split("<path")
+        .skip(1)
+        .flat_map(|e| pieces(&attribute(e, " d").expect("d")))
+        .collect()
 }
 
 /// A straight piece that a program burns, and what the program does with the beam off.
@@ -265,6 +334,7 @@ pub fn compare(drawing: &Drawing, burnt: &[[P; 2]], tolerance: f64, end_gap: f64
         .flat_map(|l| (0..l.len()).map(|i| [l[i], l[(i + 1) % l.len()]]))
         .collect();
     let (slit_map, rim_map) = (Map::new(&drawing.slits), Map::new(&rim));
+    let mark_map = Map::new(&drawing.marks);
 
     // Every slit is burnt from end to end.
     for s in &drawing.slits {
@@ -296,10 +366,10 @@ pub fn compare(drawing: &Drawing, burnt: &[[P; 2]], tolerance: f64, end_gap: f64
             }
         }
     }
-    // Nothing else is burnt: each burnt point is on a slit, or half a kerf outside a contour.
+    // Nothing else is burnt: each burnt point is on a slit or a mark, or half a kerf outside a contour.
     for s in burnt {
         for p in samples(s, 0.1) {
-            let on_slit = slit_map.nearest(p) <= tolerance;
+            let on_slit = slit_map.nearest(p).min(mark_map.nearest(p)) <= tolerance;
             let beside =
                 (rim_map.nearest(p) - 0.5 * k).abs() <= tolerance && !inside(p, &drawing.contours);
             if !on_slit && !beside {
@@ -318,7 +388,10 @@ pub fn compare(drawing: &Drawing, burnt: &[[P; 2]], tolerance: f64, end_gap: f64
             .map(|s| (s[1][0] - s[0][0]).hypot(s[1][1] - s[0][1]))
             .sum::<f64>()
     };
-    let wanted = length(&drawing.slits) + length(&rim) + 8.0 * k * drawing.contours.len() as f64;
+    let wanted = length(&drawing.slits)
+        + length(&drawing.marks)
+        + length(&rim)
+        + 8.0 * k * drawing.contours.len() as f64;
     if length(burnt) > wanted + 0.01 * length(&rim) + 1.0 {
         faults.push(format!(
             "{:.1} mm burnt, {wanted:.1} mm wanted",
