@@ -17,6 +17,25 @@ pub struct Drawing {
     pub kerf: f64,
     pub hinge: f64,
     pub edge: f64,
+    /// Finished radius of the slits' ends where they are widened, else none.
+    pub tip: Option<f64>,
+    pub corner_radius: f64,
+    pub tabs: usize,
+}
+
+/// How far a chord may lie from its arc.
+const CHORD: f64 = 0.0005;
+
+/// Points of an arc behind its first one: from `a` to `b` around `centre` by `sweep` radians.
+fn along_arc(a: P, b: P, centre: P, sweep: f64) -> Vec<P> {
+    let (x, y) = (a[0] - centre[0], a[1] - centre[1]);
+    let step = 2.0 * (1.0 - CHORD / x.hypot(y).max(CHORD)).acos();
+    let count = (sweep.abs() / step.max(1e-3)).ceil().max(1.0);
+    let turned = |k: usize| {
+        let (sin, cos) = (sweep * k as f64 / count).sin_cos();
+        [centre[0] + x * cos - y * sin, centre[1] + x * sin + y * cos]
+    };
+    (1..count as usize).map(turned).chain([b]).collect()
 }
 
 fn attribute(text: &str, name: &str) -> Option<String> {
@@ -24,18 +43,37 @@ fn attribute(text: &str, name: &str) -> Option<String> {
     Some(text[at..].split('"').next()?.to_owned())
 }
 
-/// Points of a path of M, L and Z with absolute coordinates; Y up.
+/// Points of a path of M, L, A (circles, less than a half turn) and Z with absolute coordinates; Y up.
 fn points(d: &str) -> Vec<P> {
-    d.split_whitespace()
-        .filter(|w| *w != "Z")
-        .map(|w| {
-            let (x, y) = w
-                .trim_start_matches(['M', 'L'])
-                .split_once(',')
-                .expect("x,y");
-            [x.parse().expect("x"), -y.parse::<f64>().expect("y")]
-        })
-        .collect()
+    let pair = |w: &str| -> P {
+        let (x, y) = w.split_once(',').expect("x,y");
+        [x.parse().expect("x"), -y.parse::<f64>().expect("y")]
+    };
+    let mut found: Vec<P> = vec![];
+    let mut words = d.split_whitespace();
+    while let Some(word) = words.next() {
+        if let Some(radii) = word.strip_prefix('A') {
+            let radius: f64 = radii.split(',').next().expect("rx").parse().expect("rx");
+            let flags: Vec<&str> = words.by_ref().take(3).collect();
+            assert_eq!(flags[..2], ["0", "0"], "a small arc of a circle");
+            let b = pair(words.next().expect("an end"));
+            let a = *found.last().expect("a start");
+            let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+            let chord = dx.hypot(dy);
+            // Y points down in the file: 1 is clockwise there, and here.
+            let left = if flags[2] == "0" { 1.0 } else { -1.0 };
+            let away = (radius * radius - 0.25 * chord * chord).max(0.0).sqrt() * left;
+            let centre = [
+                0.5 * (a[0] + b[0]) - away * dy / chord,
+                0.5 * (a[1] + b[1]) + away * dx / chord,
+            ];
+            let half = (0.5 * chord / radius).min(1.0).asin();
+            found.extend(along_arc(a, b, centre, left * 2.0 * half));
+        } else if word != "Z" {
+            found.push(pair(word.trim_start_matches(['M', 'L'])));
+        }
+    }
+    found
 }
 
 pub fn read_drawing(svg: &str) -> Drawing {
@@ -74,75 +112,123 @@ pub fn read_drawing(svg: &str) -> Drawing {
         kerf: number("data-kagome-kerf-mm"),
         hinge: number("data-kagome-hinge-width-mm"),
         edge: number("data-kagome-edge-mm"),
+        tip: attribute(svg, "data-kagome-tip-radius-mm").map(|r| r.parse().expect("a radius")),
+        corner_radius: attribute(svg, "data-kagome-corner-radius-mm")
+            .map_or(0.0, |r| r.parse().expect("a radius")),
+        tabs: svg.matches("<circle").count(),
     }
 }
 
-/// A straight piece that a program burns, and what the program does with the beam off.
+/// What a program burns, as straight pieces, and what it does wrong.
 pub struct Burnt {
+    /// Cuts: burnt with the program's full power.
     pub pieces: Vec<[P; 2]>,
+    /// For each of them the stroke that it belongs to: from beam on to beam off, counted from 0.
+    pub strokes: Vec<usize>,
+    /// The power of cuts.
+    pub power: f64,
+    /// Marks: burnt with less.
+    pub marks: Vec<[P; 2]>,
     pub faults: Vec<String>,
 }
 
-/// Runs the few words that a laser job needs: G0/G1 modal, X, Y, F, S, M3/M4/M5, G20/G21, G90/G91, M2.
+/// Runs the few words that a laser job needs: G0–G3 modal, X, Y, I, J, F, S, M3/M4/M5, G20/G21, G90/G91, M2.
 pub fn burn(gcode: &str) -> Burnt {
     let (mut at, mut motion, mut beam, mut power, mut feed) = ([0.0, 0.0], None, false, 0.0, 0.0);
     let (mut mm, mut absolute, mut ended) = (false, false, false);
-    let mut out = Burnt {
-        pieces: vec![],
-        faults: vec![],
-    };
+    let mut faults = vec![];
+    // Each with its power and stroke.
+    let mut burnt: Vec<([P; 2], f64, usize)> = vec![];
+    let (mut stroke, mut burning) = (0, false);
     for (n, raw) in gcode.lines().enumerate() {
-        let line = raw.split(';').next().unwrap_or("").trim();
+        let line = raw.split([';', '(']).next().unwrap_or("").trim();
         if line.len() > 79 {
-            out.faults.push(format!("line {} is too long", n + 1));
+            faults.push(format!("line {} is too long", n + 1));
         }
-        let (mut to, mut moves) = (at, false);
+        let (mut to, mut moves, mut centre) = (at, false, at);
         for word in line.split_whitespace() {
             let value: f64 = word[1..]
                 .parse()
                 .unwrap_or_else(|_| panic!("line {}: {word}", n + 1));
-            match (&word[..1], value as i64) {
-                ("G", 0 | 1) => motion = Some(value as i64),
-                ("G", 20) => out.faults.push("inches".into()),
-                ("G", 21) => mm = true,
-                ("G", 90) => absolute = true,
-                ("G", 91) => out.faults.push("incremental".into()),
-                ("M", 3) => out.faults.push(format!("line {}: constant power", n + 1)),
-                ("M", 4) => beam = true,
-                ("M", 5) => beam = false,
-                ("M", 2 | 30) => ended = true,
+            // Tenths, because of G90.1 and the like.
+            match (&word[..1], (value * 10.0).round() as i64) {
+                ("G", 0 | 10 | 20 | 30) => motion = Some(value as i64),
+                ("G", 200) => faults.push("inches".into()),
+                ("G", 210) => mm = true,
+                ("G", 900) => absolute = true,
+                ("G", 901) => faults.push("absolute centres of arcs".into()),
+                ("G", 910) => faults.push("incremental".into()),
+                ("M", 30) => faults.push(format!("line {}: constant power", n + 1)),
+                ("M", 40) => beam = true,
+                ("M", 50) => beam = false,
+                ("M", 20 | 300) => ended = true,
                 ("X", _) => (to[0], moves) = (value, true),
                 ("Y", _) => (to[1], moves) = (value, true),
+                ("I", _) => centre[0] += value,
+                ("J", _) => centre[1] += value,
                 ("F", _) => feed = value,
                 ("S", _) => power = value,
                 _ => {}
             }
         }
-        if !moves {
+        let cutting = matches!(motion, Some(1..=3));
+        // A full circle may name no end.
+        if !moves && centre == at {
             continue;
         }
         if !mm || !absolute || ended {
-            out.faults
-                .push(format!("line {}: a move outside G21 G90 … M2", n + 1));
+            faults.push(format!("line {}: a move outside G21 G90 … M2", n + 1));
         }
-        if motion == Some(1) {
-            if feed <= 0.0 {
-                out.faults.push(format!("line {}: no feed", n + 1));
+        if cutting && feed <= 0.0 {
+            faults.push(format!("line {}: no feed", n + 1));
+        }
+        if cutting && beam && power > 0.0 {
+            stroke += usize::from(!burning);
+            let way = match motion {
+                Some(2 | 3) => {
+                    let radii = [at, to].map(|p| (p[0] - centre[0]).hypot(p[1] - centre[1]));
+                    if (radii[0] - radii[1]).abs() > 0.005 {
+                        faults.push(format!("line {}: an arc with two radii", n + 1));
+                    }
+                    let angle = |p: P| (p[1] - centre[1]).atan2(p[0] - centre[0]);
+                    let turn = std::f64::consts::TAU;
+                    let left = (angle(to) - angle(at)).rem_euclid(turn);
+                    let sweep = match (motion, to == at) {
+                        (Some(3), true) => turn,
+                        (Some(3), false) => left,
+                        (_, true) => -turn,
+                        (_, false) => left - turn,
+                    };
+                    along_arc(at, to, centre, sweep)
+                }
+                _ => vec![to],
+            };
+            let mut from = at;
+            for p in way {
+                burnt.push(([from, p], power, stroke - 1));
+                from = p;
             }
-            if beam && power > 0.0 {
-                out.pieces.push([at, to]);
-            }
+            burning = true;
+        } else {
+            burning = false;
         }
         at = to;
     }
     if beam || !ended {
-        out.faults
-            .push("the program ends with the beam on, or not at all".into());
+        faults.push("the program ends with the beam on, or not at all".into());
     }
-    out
+    let power = burnt.iter().map(|b| b.1).fold(0.0, f64::max);
+    let cuts = || burnt.iter().filter(|b| b.1 == power);
+    Burnt {
+        pieces: cuts().map(|b| b.0).collect(),
+        strokes: cuts().map(|b| b.2).collect(),
+        power,
+        marks: burnt.iter().filter(|b| b.1 < power).map(|b| b.0).collect(),
+        faults,
+    }
 }
 
-fn distance(p: P, s: &[P; 2]) -> f64 {
+pub(super) fn distance(p: P, s: &[P; 2]) -> f64 {
     let d = [s[1][0] - s[0][0], s[1][1] - s[0][1]];
     let q = [p[0] - s[0][0], p[1] - s[0][1]];
     let l = d[0] * d[0] + d[1] * d[1];
@@ -199,7 +285,7 @@ fn samples(s: &[P; 2], step: f64) -> impl Iterator<Item = P> + '_ {
 }
 
 /// True if p lies inside the closed loops (even-odd).
-fn inside(p: P, loops: &[Vec<P>]) -> bool {
+pub(super) fn inside(p: P, loops: &[Vec<P>]) -> bool {
     let mut odd = false;
     for l in loops {
         for i in 0..l.len() {
@@ -304,16 +390,15 @@ pub fn narrowest_ligament(drawing: &Drawing) -> f64 {
 
 /// Area of the sheet by its contours, mm².
 pub fn area(drawing: &Drawing) -> f64 {
-    let loops = &drawing.contours;
-    loops
-        .iter()
-        .map(|l| {
-            (0..l.len())
-                .map(|i| l[i][0] * l[(i + 1) % l.len()][1] - l[i][1] * l[(i + 1) % l.len()][0])
-                .sum::<f64>()
-                / 2.0
-        })
-        .sum()
+    drawing.contours.iter().map(|l| loop_area(l)).sum()
+}
+
+/// Area inside a closed loop, negative if it runs clockwise.
+pub fn loop_area(l: &[P]) -> f64 {
+    (0..l.len())
+        .map(|i| l[i][0] * l[(i + 1) % l.len()][1] - l[i][1] * l[(i + 1) % l.len()][0])
+        .sum::<f64>()
+        / 2.0
 }
 
 /// What the outlines of the flap triangles say: sides that they share with triangles of the sheet, with each other, and
