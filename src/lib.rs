@@ -44,8 +44,9 @@
 //! use kagome::conformal::{ConeRequest, FlattenOptions, Sizing, flatten};
 //! use kagome::linkage::{Handedness, LinkageOptions, build};
 //! use kagome::mesh::{ClosestPoint, Sample};
-//! use kagome::pattern::{Sheet, placed};
+//! use kagome::pattern::{Sheet, SheetOptions, placed};
 //! use kagome::rationalize::{Quality, Solver, rationalize};
+//! use kagome::toolpath::CutOptions;
 //! use kagome::{gcode, machine, material, toolpath};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -79,10 +80,11 @@
 //! assert_eq!(quality.penetrations + quality.intersections + quality.over_sigma, 0);
 //!
 //! // The sheet, the job, and the proof that one cuts the other.
-//! let (hinge_mm, kerf_mm) = (material.hinge_width_mm, setting.kerf_mm);
-//! let sheet = Sheet::with_flaps(&built.linkage, &built.flaps, hinge_mm, kerf_mm)?;
+//! let shapes = SheetOptions::plain(material.hinge_width_mm, setting.kerf_mm);
+//! let sheet = Sheet::with_flaps(&built.linkage, &built.flaps, &shapes)?;
 //! let (sheet, _) = placed(&sheet, &machine, false)?;
-//! let cuts = toolpath::plan(&sheet, &setting, machine.park_mm())?;
+//! let how = CutOptions::of(&setting, &machine, material.mark_for(&machine).as_ref());
+//! let cuts = toolpath::plan(&sheet, &how, machine.park_mm())?;
 //! let text = gcode::write(&cuts, &machine, &material)?;
 //! assert!(gcode::verify(&text, &machine, Some(&sheet), Some(setting.passes))?.passed());
 //! # Ok(())

@@ -2,8 +2,9 @@
 
 use clap::Args;
 
-use crate::job::{SheetWish, TAB_WIDTH_MM};
+use crate::job::{COOL_REACH_MM, SheetWish, TAB_WIDTH_MM};
 use crate::pattern::Tip;
+use crate::toolpath::Heat;
 
 /// Shapes and stock.
 #[derive(Args, Clone, Debug)]
@@ -27,6 +28,10 @@ pub struct SheetArgs {
     /// Tabs that hold each part in the stock until they are broken: N, or N:WIDTH in millimetres
     #[arg(long, value_name = "N[:MM]", value_parser = tabs, default_value = "0", hide_default_value = true)]
     tabs: (usize, f64),
+    /// Keep successive cuts apart, to spare thin material the heat: cutting next to a cut just made costs as much as PRICE
+    /// millimetres of travel, less the farther away, and nothing from REACH millimetres on [default REACH: 20]
+    #[arg(long, value_name = "PRICE[:REACH]", value_parser = cool)]
+    cool: Option<Heat>,
 }
 
 impl SheetArgs {
@@ -40,6 +45,7 @@ impl SheetArgs {
             alignment_hole_mm: self.alignment_holes,
             tabs: self.tabs.0,
             tab_width_mm: self.tabs.1,
+            heat: self.cool.unwrap_or(Heat::NONE),
         }
     }
 
@@ -52,6 +58,7 @@ impl SheetArgs {
             (self.corner_radius.is_some(), "--corner-radius"),
             (self.alignment_holes != 0.0, "--alignment-holes"),
             (self.tabs.0 != 0, "--tabs"),
+            (self.cool.is_some(), "--cool"),
         ]
         .into_iter()
         .filter_map(|(given, name)| given.then_some(name))
@@ -112,4 +119,19 @@ fn tabs(text: &str) -> Result<(usize, f64), String> {
         width => length(width).ok().filter(|w| *w > 0.0).ok_or_else(wrong)?,
     };
     Ok((count, width))
+}
+
+fn cool(text: &str) -> Result<Heat, String> {
+    let wrong = || {
+        "a price in millimetres of travel, and from how far away on nothing is paid if not 20 mm, both above 0: for example 20 or 20:15".to_owned()
+    };
+    let (price, reach) = text.split_once(':').unwrap_or((text, ""));
+    let positive = |text: &str| length(text).ok().filter(|v| *v > 0.0).ok_or_else(wrong);
+    Ok(Heat {
+        price_mm: positive(price)?,
+        reach_mm: match reach {
+            "" => COOL_REACH_MM,
+            reach => positive(reach)?,
+        },
+    })
 }

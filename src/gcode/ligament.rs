@@ -59,6 +59,10 @@ pub(super) fn measure(
                 b: slit.tip,
             };
             index.near(&spot, neck + meta.kerf_mm, &mut near);
+            // Only what is near the tip: farther in, the other arms of its own star are no neighbours.
+            let whole = slit.tip.distance(slit.tail);
+            let around = meta.tip.radius_mm(meta.kerf_mm) - 0.5 * meta.kerf_mm;
+            let near_tip = neck.min((whole - meta.hinge_width_mm - meta.kerf_mm).max(around));
             let is_own = |s: &Segment| {
                 [s.a, s.a.midpoint(s.b), s.b].iter().all(|p| {
                     own.iter()
@@ -70,8 +74,7 @@ pub(super) fn measure(
             for &n in &near {
                 let s = index.segment(n);
                 if is_own(&s) {
-                    // Only what is near the tip: farther in, its own star begins.
-                    mine.extend(clipped(&s, slit.tip, neck));
+                    mine.extend(clipped(&s, slit.tip, near_tip));
                 } else {
                     others.push(s);
                 }

@@ -17,7 +17,7 @@ use crate::material::{CutSetting, Material};
 use crate::pattern::{self, Sheet};
 use crate::planner::{self, Motion, total_s};
 use crate::sim::{RehearsalSummary, Settings, rehearse};
-use crate::toolpath::{CutOptions, Toolpath, plan};
+use crate::toolpath::{CutOptions, Heat, Role, Toolpath, plan, spacing};
 
 /// A job and what was found about it.
 #[derive(Debug)]
@@ -63,17 +63,22 @@ fn slack(machine: &Machine) -> Slack {
     }
 }
 
-/// Plans, writes, verifies and rehearses the cut of `sheet`, which lies in its place on the bed.
+/// Plans, writes, verifies and rehearses the cut of `sheet`, which lies in its place on the bed, in an order at this
+/// price of heat.
 pub(crate) fn cut(
     sheet: &Sheet,
     machine: &Machine,
     material: &Material,
     setting: &CutSetting,
+    heat: Heat,
     progress: &dyn Progress,
 ) -> Result<CutResult, MakeError> {
     progress.start("toolpath", None);
     let marks = material.mark_for(machine);
-    let options = CutOptions::of(setting, machine, marks.as_ref());
+    let options = CutOptions {
+        heat,
+        ..CutOptions::of(setting, machine, marks.as_ref())
+    };
     let toolpath = plan(sheet, &options, machine.park_mm()).map_err(MakeError::Toolpath)?;
     progress.check()?;
     let gcode = gcode::write(&toolpath, machine, material).map_err(MakeError::Gcode)?;
@@ -246,7 +251,7 @@ pub fn cut_drawing(
             machine.name
         ));
     }
-    let made = cut(&sheet, &machine, &material, &setting, progress)?;
+    let made = cut(&sheet, &machine, &material, &setting, Heat::NONE, progress)?;
     Ok(CutDrawing {
         figures: made.figures(),
         drawing: pattern::svg(&sheet),
@@ -272,11 +277,17 @@ fn listed(heading: &str, findings: impl ExactSizeIterator<Item = String>) -> Vec
 impl CutResult {
     /// The figures for the report.
     pub fn figures(&self) -> Value {
+        // Slits alone: a rim has no choice of where it lies, and its ends are one point.
+        let slits = self.toolpath.cuts.iter().filter(|c| c.role == Role::Slit);
+        let ends: Vec<[Point; 2]> = slits.filter_map(|c| Some([c.start()?, c.end()?])).collect();
+        let spacing = spacing(&ends);
         json!({
             "strokes": self.toolpath.cuts.len(),
             "cut_length_mm": self.cut_length_mm,
             "travel_mm": self.travel_mm,
             "machine_s": self.machine_s,
+            "spacing_mean_mm": spacing.map(|s| s.mean_mm),
+            "spacing_low_mm": spacing.map(|s| s.low_mm),
             "gcode_lines": self.gcode.lines().count(),
             "verified": true,
             "rehearsal": self.rehearsal,

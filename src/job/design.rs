@@ -17,6 +17,7 @@ use crate::material::TipShape;
 use crate::mesh::{ImportOptions, PartChoice, Unit, Units};
 use crate::pattern::Tip;
 use crate::rationalize::Solver;
+use crate::toolpath::Heat;
 
 /// The version of the format that this program writes and reads.
 pub const FORMAT: u32 = 1;
@@ -125,6 +126,12 @@ pub struct SheetChoice {
     /// Width of each, millimetres.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub tab_width_mm: f64,
+    /// What it costs to cut next to a cut just made, millimetres of travel.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub cool_price_mm: f64,
+    /// From how far away on it costs nothing, millimetres.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub cool_reach_mm: f64,
 }
 
 fn is_zero(value: &f64) -> bool {
@@ -150,6 +157,10 @@ impl SheetChoice {
             alignment_hole_mm: self.alignment_hole_mm,
             tabs: self.tabs,
             tab_width_mm: self.tab_width_mm,
+            heat: Heat {
+                price_mm: self.cool_price_mm,
+                reach_mm: self.cool_reach_mm,
+            },
         }
     }
 }
@@ -361,6 +372,14 @@ impl Design {
         )?;
         ranged("sheet.tabs", self.sheet.tabs as f64, 0.0, 1000.0)?;
         ranged("sheet.tab_width_mm", self.sheet.tab_width_mm, 0.0, 100.0)?;
+        ranged("sheet.cool_price_mm", self.sheet.cool_price_mm, 0.0, 1e4)?;
+        ranged("sheet.cool_reach_mm", self.sheet.cool_reach_mm, 0.0, 1e4)?;
+        if (self.sheet.cool_price_mm > 0.0) != (self.sheet.cool_reach_mm > 0.0) {
+            return Err(Complaint::new(
+                "sheet.cool_reach_mm",
+                "goes with cool_price_mm: give both or neither",
+            ));
+        }
         ranged("linkage.edge_mm", self.linkage.edge_mm, 0.01, 1e5)?;
         ranged(
             "linkage.orientation_deg",

@@ -181,6 +181,7 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         remedy::explain(request, &mut shape, &stock, &targets, progress)?;
     }
     let mut warnings = tell::warnings(&loaded, &material, &shape, stock.sigma);
+    warnings.extend(tell::tabs(&shape, stock.tabs));
 
     let edge_mm = shape.flat.edge_mm;
     let measured: Vec<(Vec<f64>, Vec<f64>)> = shape
@@ -224,7 +225,8 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     let mut jobs = Vec::new();
     if shape.verdict.pass {
         for sheet in &shape.sheets {
-            let cut = cut(sheet, &machine, &material, &setting, progress)?;
+            let heat = request.sheet.heat;
+            let cut = cut(sheet, &machine, &material, &setting, heat, progress)?;
             let objections = cut.objections.iter().cloned().map(Reason::from);
             shape.verdict.reasons.extend(objections);
             jobs.push(cut);
@@ -461,6 +463,8 @@ pub(crate) fn decided(
             } else {
                 0.0
             },
+            cool_price_mm: request.sheet.heat.price_mm,
+            cool_reach_mm: request.sheet.heat.reach_mm,
         },
         linkage: LinkageChoice {
             edge_mm: shape.flat.edge_mm,

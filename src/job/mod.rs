@@ -37,8 +37,8 @@ pub use linkage_figures::LinkageFigures;
 pub use make::{FILES, Made, make};
 pub use map_figures::{ConeFigures, MapFigures};
 pub use request::{
-    ACCEPT_DISTANCE, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, FlapWish, Request,
-    SheetWish, Source, TAB_WIDTH_MM,
+    ACCEPT_DISTANCE, COOL_REACH_MM, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, FlapWish,
+    Request, SheetWish, Source, TAB_WIDTH_MM,
 };
 pub use states::{Opening, StateFigures, StateFiles};
 pub use verdict::{COVERAGE_WANTED, EDGE_TOLERANCE, Reason, Verdict};

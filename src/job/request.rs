@@ -7,6 +7,7 @@ use crate::linkage::Handedness;
 use crate::mesh::ImportOptions;
 use crate::pattern::Tip;
 use crate::rationalize::Solver;
+use crate::toolpath::Heat;
 
 /// Where the surface comes from.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,6 +80,8 @@ pub struct SheetWish {
     pub tabs: usize,
     /// Width of each, millimetres.
     pub tab_width_mm: f64,
+    /// What it costs to cut close to the cuts just made.
+    pub heat: Heat,
 }
 
 impl Default for SheetWish {
@@ -91,12 +94,16 @@ impl Default for SheetWish {
             alignment_hole_mm: 0.0,
             tabs: 0,
             tab_width_mm: TAB_WIDTH_MM,
+            heat: Heat::NONE,
         }
     }
 }
 
 /// Width of a tab unless told otherwise, millimetres: broken by hand in leather and ply.
 pub const TAB_WIDTH_MM: f64 = 0.5;
+
+/// How far the heat of a cut is felt unless told otherwise, millimetres.
+pub const COOL_REACH_MM: f64 = 20.0;
 
 /// Everything that `make` needs.
 #[derive(Clone, Debug)]

@@ -70,7 +70,9 @@ impl Sheets {
             Err(other) => return Err(MakeError::Pattern(other)),
         }
         for sheet in &mut this.sheets {
-            sheet.tabs = sheet.even_tabs(stock.tabs, stock.tab_width_mm);
+            sheet.tabs = sheet
+                .tabs_for(stock.tabs, stock.tab_width_mm)
+                .map_err(MakeError::Pattern)?;
         }
         Ok(this)
     }

@@ -108,6 +108,19 @@ pub(crate) fn warnings(
     warnings
 }
 
+/// Says so where fewer tabs hold a part than were asked for each.
+pub(crate) fn tabs(shape: &Shape, wanted: usize) -> Option<String> {
+    let count = |f: fn(&Sheet) -> usize| shape.sheets.iter().map(f).sum::<usize>();
+    let parts = count(|s| s.contours.iter().filter(|c| c.outer).count());
+    let found = count(|s| s.tabs.len());
+    (found < wanted * parts).then(|| {
+        format!(
+            "{found} tabs of {} fit: each needs a straight stretch of the rim for itself, twice as long as the tab",
+            wanted * parts
+        )
+    })
+}
+
 /// Says so where folds strain hinges beyond what stretching a flat one to σ would.
 pub(crate) fn risk(fit: &Fit, risks: &[HingeRisk]) -> Option<String> {
     let beyond = risks.iter().filter(|r| r.share > 1.0).count();

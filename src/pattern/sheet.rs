@@ -275,6 +275,16 @@ pub enum PatternError {
         /// Where.
         y: f64,
     },
+    /// Tabs are asked for, and none fits a part's rim.
+    #[error(
+        "a tab of {width_mm} mm finds no straight stretch of the rim that is long enough, and the part would fall out when it is cut free: tabs can be {most_mm:.3} mm wide at the most (--tabs N:WIDTH)"
+    )]
+    NoTab {
+        /// Width of a tab.
+        width_mm: f64,
+        /// The widest that fits.
+        most_mm: f64,
+    },
     /// The boundary sides do not close to loops.
     #[error("the rim of the sheet does not close near ({x:.3}, {y:.3}) mm")]
     OpenRim {

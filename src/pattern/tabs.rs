@@ -1,6 +1,6 @@
 //! Where tabs hold a part in the stock.
 
-use super::sheet::{Sheet, Tab};
+use super::sheet::{PatternError, Sheet, Tab};
 use crate::base::curve::{Curve, Piece};
 
 impl Sheet {
@@ -12,6 +12,28 @@ impl Sheet {
             tabs.extend(along(&contour.line, count, width_mm, self.metadata.kerf_mm));
         }
         tabs
+    }
+
+    /// As [`Sheet::even_tabs`], where every part must be held.
+    ///
+    /// # Errors
+    /// [`PatternError::NoTab`] if tabs are asked for and a part has no straight stretch long enough for one.
+    pub fn tabs_for(&self, count: usize, width_mm: f64) -> Result<Vec<Tab>, PatternError> {
+        if count > 0 {
+            let kerf_mm = self.metadata.kerf_mm;
+            let rims = self.contours.iter().filter(|c| c.outer);
+            for rim in rims {
+                if along(&rim.line, count, width_mm, kerf_mm).is_empty() {
+                    let straight = rim.line.pieces().filter(|p| p.bulge == 0.0);
+                    let longest = straight.map(|p| p.length()).fold(0.0, f64::max);
+                    return Err(PatternError::NoTab {
+                        width_mm,
+                        most_mm: (0.5 * longest - kerf_mm).max(0.0),
+                    });
+                }
+            }
+        }
+        Ok(self.even_tabs(count, width_mm))
     }
 }
 
@@ -52,7 +74,7 @@ fn along(line: &Curve, count: usize, width_mm: f64, kerf_mm: f64) -> Vec<Tab> {
 #[cfg(test)]
 mod tests {
     use crate::linkage::{Handedness, Linkage};
-    use crate::pattern::{Sheet, SheetOptions};
+    use crate::pattern::{PatternError, Sheet, SheetOptions};
 
     #[test]
     fn tabs_are_spread_over_the_sides_of_every_part() {
@@ -79,5 +101,11 @@ mod tests {
             sheet.even_tabs(3, 20.0).is_empty(),
             "no piece is long enough"
         );
+        assert!(sheet.tabs_for(0, 20.0).unwrap().is_empty());
+        let PatternError::NoTab { most_mm, .. } = sheet.tabs_for(3, 20.0).unwrap_err() else {
+            panic!("an error about tabs");
+        };
+        assert_eq!(sheet.tabs_for(3, most_mm - 1e-9).unwrap().len(), 3);
+        assert!(sheet.tabs_for(3, most_mm + 1e-6).is_err());
     }
 }

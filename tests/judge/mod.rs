@@ -1,4 +1,4 @@
-//! Two judges that know file formats and nothing of the program, so that the tests can hold it to its word.
+//! Judges that know file formats and nothing of the program, so that the tests can hold it to its word.
 
 #![allow(
     dead_code,
@@ -12,4 +12,5 @@
 )]
 
 pub mod linkage;
+pub mod raster;
 pub mod sheet;

@@ -14,11 +14,28 @@ pub struct Drawing {
     pub contours: Vec<Vec<P>>,
     pub triangles: Vec<Vec<P>>,
     pub flaps: Vec<Vec<P>>,
-    /// Strokes of everything engraved, in short pieces.
-    pub marks: Vec<[P; 2]>,
     pub kerf: f64,
     pub hinge: f64,
     pub edge: f64,
+    /// Finished radius of the slits' ends where they are widened, else none.
+    pub tip: Option<f64>,
+    pub corner_radius: f64,
+    pub tabs: usize,
+}
+
+/// How far a chord may lie from its arc.
+const CHORD: f64 = 0.0005;
+
+/// Points of an arc behind its first one: from `a` to `b` around `centre` by `sweep` radians.
+fn along_arc(a: P, b: P, centre: P, sweep: f64) -> Vec<P> {
+    let (x, y) = (a[0] - centre[0], a[1] - centre[1]);
+    let step = 2.0 * (1.0 - CHORD / x.hypot(y).max(CHORD)).acos();
+    let count = (sweep.abs() / step.max(1e-3)).ceil().max(1.0);
+    let turned = |k: usize| {
+        let (sin, cos) = (sweep * k as f64 / count).sin_cos();
+        [centre[0] + x * cos - y * sin, centre[1] + x * sin + y * cos]
+    };
+    (1..count as usize).map(turned).chain([b]).collect()
 }
 
 fn attribute(text: &str, name: &str) -> Option<String> {
@@ -26,73 +43,37 @@ fn attribute(text: &str, name: &str) -> Option<String> {
     Some(text[at..].split('"').next()?.to_owned())
 }
 
-/// Points of a path of M, L and Z with absolute coordinates; Y up.
+/// Points of a path of M, L, A (circles, less than a half turn) and Z with absolute coordinates; Y up.
 fn points(d: &str) -> Vec<P> {
-    d.split_whitespace()
-        .filter(|w| *w != "Z")
-        .map(|w| {
-            let (x, y) = w
-                .trim_start_matches(['M', 'L'])
-                .split_once(',')
-                .expect("x,y");
-            [x.parse().expect("x"), -y.parse::<f64>().expect("y")]
-        })
-        .collect()
-}
-
-/// Short pieces of a path that has arcs of circles, each less than half a turn, too; Y up.
-fn pieces(d: &str) -> Vec<[P; 2]> {
-    let mut all = vec![];
-    let (mut at, mut words) = ([0.0; 2], d.split_whitespace());
-    let pair = |w: &str| {
-        let (x, y) = w
-            .trim_start_matches(['M', 'L', 'A'])
-            .split_once(',')
-            .expect("x,y");
-        [x.parse::<f64>().expect("x"), y.parse::<f64>().expect("y")]
+    let pair = |w: &str| -> P {
+        let (x, y) = w.split_once(',').expect("x,y");
+        [x.parse().expect("x"), -y.parse::<f64>().expect("y")]
     };
+    let mut found: Vec<P> = vec![];
+    let mut words = d.split_whitespace();
     while let Some(word) = words.next() {
-        if word == "Z" {
-            continue;
-        }
-        let numbers = pair(word);
-        let to = if word.starts_with('A') {
-            let sweep = words.nth(2).expect("a flag") == "1";
-            let to = pair(words.next().expect("an end"));
-            // The centre is on the right of the chord, as the viewer sees it, where the arc turns with the clock.
-            let (d, r) = ([to[0] - at[0], to[1] - at[1]], numbers[0]);
-            let l = d[0].hypot(d[1]);
-            let reach = (r * r - l * l / 4.0).max(0.0).sqrt() * if sweep { 1.0 } else { -1.0 };
-            let c = [
-                (at[0] + to[0]) / 2.0 - d[1] / l * reach,
-                (at[1] + to[1]) / 2.0 + d[0] / l * reach,
+        if let Some(radii) = word.strip_prefix('A') {
+            let radius: f64 = radii.split(',').next().expect("rx").parse().expect("rx");
+            let flags: Vec<&str> = words.by_ref().take(3).collect();
+            assert_eq!(flags[..2], ["0", "0"], "a small arc of a circle");
+            let b = pair(words.next().expect("an end"));
+            let a = *found.last().expect("a start");
+            let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+            let chord = dx.hypot(dy);
+            // Y points down in the file: 1 is clockwise there, and here.
+            let left = if flags[2] == "0" { 1.0 } else { -1.0 };
+            let away = (radius * radius - 0.25 * chord * chord).max(0.0).sqrt() * left;
+            let centre = [
+                0.5 * (a[0] + b[0]) - away * dy / chord,
+                0.5 * (a[1] + b[1]) + away * dx / chord,
             ];
-            let angle = |p: P| (p[1] - c[1]).atan2(p[0] - c[0]);
-            let tau = std::f64::consts::TAU;
-            let mut turn = (angle(to) - angle(at)).rem_euclid(tau);
-            if !sweep {
-                turn -= tau;
-            }
-            let (start, from) = (angle(at), at);
-            let point = |k: i32| {
-                let a = start + turn * f64::from(k) / 64.0;
-                if k == 0 {
-                    from
-                } else {
-                    [c[0] + r * a.cos(), c[1] + r * a.sin()]
-                }
-            };
-            all.extend((0..64).map(|k| [point(k), point(k + 1)]));
-            to
-        } else {
-            if word.starts_with('L') {
-                all.push([at, numbers]);
-            }
-            numbers
-        };
-        at = to;
+            let half = (0.5 * chord / radius).min(1.0).asin();
+            found.extend(along_arc(a, b, centre, left * 2.0 * half));
+        } else if word != "Z" {
+            found.push(pair(word.trim_start_matches(['M', 'L'])));
+        }
     }
-    all.iter().map(|s| s.map(|p| [p[0], -p[1]])).collect()
+    found
 }
 
 pub fn read_drawing(svg: &str) -> Drawing {
@@ -128,130 +109,126 @@ pub fn read_drawing(svg: &str) -> Drawing {
         contours: group("contour"),
         triangles: triangles.into_iter().map(|e| e.1).collect(),
         flaps: flaps.into_iter().map(|e| e.1).collect(),
-        marks: marks(svg),
         kerf: number("data-kagome-kerf-mm"),
         hinge: number("data-kagome-hinge-width-mm"),
         edge: number("data-kagome-edge-mm"),
+        tip: attribute(svg, "data-kagome-tip-radius-mm").map(|r| r.parse().expect("a radius")),
+        corner_radius: attribute(svg, "data-kagome-corner-radius-mm")
+            .map_or(0.0, |r| r.parse().expect("a radius")),
+        tabs: svg.matches("<circle").count(),
     }
 }
 
-fn marks(svg: &str) -> Vec<[P; 2]> {
-    let Some(start) = svg.find("id=\"marks\"") else {
-        return vec![];
-    };
-    let body = svg[start..].split("</g>").next().expect("the group's end");
-    body.split("<path")
-        .skip(1)
-        .flat_map(|e| pieces(&attribute(e, " d").expect("d")))
-        .collect()
-}
-
-/// A straight piece that a program burns, and what the program does with the beam off.
+/// What a program burns, as straight pieces, and what it does wrong.
 pub struct Burnt {
+    /// Cuts: burnt with the program's full power.
     pub pieces: Vec<[P; 2]>,
+    /// For each of them the stroke that it belongs to: from beam on to beam off, counted from 0.
+    pub strokes: Vec<usize>,
+    /// The power of cuts.
+    pub power: f64,
+    /// Marks: burnt with less.
+    pub marks: Vec<[P; 2]>,
     pub faults: Vec<String>,
 }
 
-/// Runs the few words that a laser job needs: G0 to G3 modal, X, Y, I, J, F, S, M3/M4/M5, G20/G21, G90/G91, M2. Arcs
-/// become pieces of two degrees.
+/// Runs the few words that a laser job needs: G0–G3 modal, X, Y, I, J, F, S, M3/M4/M5, G20/G21, G90/G91, M2.
 pub fn burn(gcode: &str) -> Burnt {
     let (mut at, mut motion, mut beam, mut power, mut feed) = ([0.0, 0.0], None, false, 0.0, 0.0);
     let (mut mm, mut absolute, mut ended) = (false, false, false);
-    let mut out = Burnt {
-        pieces: vec![],
-        faults: vec![],
-    };
+    let mut faults = vec![];
+    // Each with its power and stroke.
+    let mut burnt: Vec<([P; 2], f64, usize)> = vec![];
+    let (mut stroke, mut burning) = (0, false);
     for (n, raw) in gcode.lines().enumerate() {
-        let line = raw.split(';').next().unwrap_or("").trim();
+        let line = raw.split([';', '(']).next().unwrap_or("").trim();
         if line.len() > 79 {
-            out.faults.push(format!("line {} is too long", n + 1));
+            faults.push(format!("line {} is too long", n + 1));
         }
-        let (mut to, mut moves, mut to_centre) = (at, false, [0.0, 0.0]);
+        let (mut to, mut moves, mut centre) = (at, false, at);
         for word in line.split_whitespace() {
             let value: f64 = word[1..]
                 .parse()
                 .unwrap_or_else(|_| panic!("line {}: {word}", n + 1));
-            match (&word[..1], value as i64) {
-                ("G", 0..=3) => motion = Some(value as i64),
-                ("G", 20) => out.faults.push("inches".into()),
-                ("G", 21) => mm = true,
-                ("G", 90) => absolute = true,
-                ("G", 91) => out.faults.push("incremental".into()),
-                ("M", 3) => out.faults.push(format!("line {}: constant power", n + 1)),
-                ("M", 4) => beam = true,
-                ("M", 5) => beam = false,
-                ("M", 2 | 30) => ended = true,
+            // Tenths, because of G90.1 and the like.
+            match (&word[..1], (value * 10.0).round() as i64) {
+                ("G", 0 | 10 | 20 | 30) => motion = Some(value as i64),
+                ("G", 200) => faults.push("inches".into()),
+                ("G", 210) => mm = true,
+                ("G", 900) => absolute = true,
+                ("G", 901) => faults.push("absolute centres of arcs".into()),
+                ("G", 910) => faults.push("incremental".into()),
+                ("M", 30) => faults.push(format!("line {}: constant power", n + 1)),
+                ("M", 40) => beam = true,
+                ("M", 50) => beam = false,
+                ("M", 20 | 300) => ended = true,
                 ("X", _) => (to[0], moves) = (value, true),
                 ("Y", _) => (to[1], moves) = (value, true),
-                ("I", _) => to_centre[0] = value,
-                ("J", _) => to_centre[1] = value,
+                ("I", _) => centre[0] += value,
+                ("J", _) => centre[1] += value,
                 ("F", _) => feed = value,
                 ("S", _) => power = value,
                 _ => {}
             }
         }
-        if !moves {
+        let cutting = matches!(motion, Some(1..=3));
+        // A full circle may name no end.
+        if !moves && centre == at {
             continue;
         }
         if !mm || !absolute || ended {
-            out.faults
-                .push(format!("line {}: a move outside G21 G90 … M2", n + 1));
+            faults.push(format!("line {}: a move outside G21 G90 … M2", n + 1));
         }
-        if motion != Some(0) {
-            if feed <= 0.0 {
-                out.faults.push(format!("line {}: no feed", n + 1));
-            }
-            if beam && power > 0.0 {
-                match motion {
-                    Some(2 | 3) => {
-                        let centre = [at[0] + to_centre[0], at[1] + to_centre[1]];
-                        arc(at, to, centre, motion == Some(2), &mut out);
+        if cutting && feed <= 0.0 {
+            faults.push(format!("line {}: no feed", n + 1));
+        }
+        if cutting && beam && power > 0.0 {
+            stroke += usize::from(!burning);
+            let way = match motion {
+                Some(2 | 3) => {
+                    let radii = [at, to].map(|p| (p[0] - centre[0]).hypot(p[1] - centre[1]));
+                    if (radii[0] - radii[1]).abs() > 0.005 {
+                        faults.push(format!("line {}: an arc with two radii", n + 1));
                     }
-                    _ => out.pieces.push([at, to]),
+                    let angle = |p: P| (p[1] - centre[1]).atan2(p[0] - centre[0]);
+                    let turn = std::f64::consts::TAU;
+                    let left = (angle(to) - angle(at)).rem_euclid(turn);
+                    let sweep = match (motion, to == at) {
+                        (Some(3), true) => turn,
+                        (Some(3), false) => left,
+                        (_, true) => -turn,
+                        (_, false) => left - turn,
+                    };
+                    along_arc(at, to, centre, sweep)
                 }
+                _ => vec![to],
+            };
+            let mut from = at;
+            for p in way {
+                burnt.push(([from, p], power, stroke - 1));
+                from = p;
             }
+            burning = true;
+        } else {
+            burning = false;
         }
         at = to;
     }
     if beam || !ended {
-        out.faults
-            .push("the program ends with the beam on, or not at all".into());
+        faults.push("the program ends with the beam on, or not at all".into());
     }
-    out
-}
-
-/// An arc as pieces; its two radii must agree as GRBL wants it.
-fn arc(from: P, to: P, centre: P, clockwise: bool, out: &mut Burnt) {
-    let polar = |p: P| {
-        let d = [p[0] - centre[0], p[1] - centre[1]];
-        (d[0].hypot(d[1]), d[1].atan2(d[0]))
-    };
-    let ((r, a), (s, b)) = (polar(from), polar(to));
-    if (r - s).abs() > 0.005 {
-        out.faults
-            .push(format!("error:33 at {from:?}: radii {r} and {s}"));
-    }
-    let turn = std::f64::consts::TAU;
-    let sweep = if clockwise {
-        -(a - b).rem_euclid(turn)
-    } else {
-        (b - a).rem_euclid(turn)
-    };
-    let steps = (sweep.abs().to_degrees() / 2.0).ceil().max(1.0) as usize;
-    let mut last = from;
-    for k in 1..=steps {
-        let t = k as f64 / steps as f64;
-        let (radius, angle) = (r + t * (s - r), a + t * sweep);
-        let next = [
-            centre[0] + radius * angle.cos(),
-            centre[1] + radius * angle.sin(),
-        ];
-        out.pieces.push([last, next]);
-        last = next;
+    let power = burnt.iter().map(|b| b.1).fold(0.0, f64::max);
+    let cuts = || burnt.iter().filter(|b| b.1 == power);
+    Burnt {
+        pieces: cuts().map(|b| b.0).collect(),
+        strokes: cuts().map(|b| b.2).collect(),
+        power,
+        marks: burnt.iter().filter(|b| b.1 < power).map(|b| b.0).collect(),
+        faults,
     }
 }
 
-fn distance(p: P, s: &[P; 2]) -> f64 {
+pub(super) fn distance(p: P, s: &[P; 2]) -> f64 {
     let d = [s[1][0] - s[0][0], s[1][1] - s[0][1]];
     let q = [p[0] - s[0][0], p[1] - s[0][1]];
     let l = d[0] * d[0] + d[1] * d[1];
@@ -308,7 +285,7 @@ fn samples(s: &[P; 2], step: f64) -> impl Iterator<Item = P> + '_ {
 }
 
 /// True if p lies inside the closed loops (even-odd).
-fn inside(p: P, loops: &[Vec<P>]) -> bool {
+pub(super) fn inside(p: P, loops: &[Vec<P>]) -> bool {
     let mut odd = false;
     for l in loops {
         for i in 0..l.len() {
@@ -334,7 +311,6 @@ pub fn compare(drawing: &Drawing, burnt: &[[P; 2]], tolerance: f64, end_gap: f64
         .flat_map(|l| (0..l.len()).map(|i| [l[i], l[(i + 1) % l.len()]]))
         .collect();
     let (slit_map, rim_map) = (Map::new(&drawing.slits), Map::new(&rim));
-    let mark_map = Map::new(&drawing.marks);
 
     // Every slit is burnt from end to end.
     for s in &drawing.slits {
@@ -366,10 +342,10 @@ pub fn compare(drawing: &Drawing, burnt: &[[P; 2]], tolerance: f64, end_gap: f64
             }
         }
     }
-    // Nothing else is burnt: each burnt point is on a slit or a mark, or half a kerf outside a contour.
+    // Nothing else is burnt: each burnt point is on a slit, or half a kerf outside a contour.
     for s in burnt {
         for p in samples(s, 0.1) {
-            let on_slit = slit_map.nearest(p).min(mark_map.nearest(p)) <= tolerance;
+            let on_slit = slit_map.nearest(p) <= tolerance;
             let beside =
                 (rim_map.nearest(p) - 0.5 * k).abs() <= tolerance && !inside(p, &drawing.contours);
             if !on_slit && !beside {
@@ -388,10 +364,7 @@ pub fn compare(drawing: &Drawing, burnt: &[[P; 2]], tolerance: f64, end_gap: f64
             .map(|s| (s[1][0] - s[0][0]).hypot(s[1][1] - s[0][1]))
             .sum::<f64>()
     };
-    let wanted = length(&drawing.slits)
-        + length(&drawing.marks)
-        + length(&rim)
-        + 8.0 * k * drawing.contours.len() as f64;
+    let wanted = length(&drawing.slits) + length(&rim) + 8.0 * k * drawing.contours.len() as f64;
     if length(burnt) > wanted + 0.01 * length(&rim) + 1.0 {
         faults.push(format!(
             "{:.1} mm burnt, {wanted:.1} mm wanted",
@@ -417,16 +390,15 @@ pub fn narrowest_ligament(drawing: &Drawing) -> f64 {
 
 /// Area of the sheet by its contours, mm².
 pub fn area(drawing: &Drawing) -> f64 {
-    let loops = &drawing.contours;
-    loops
-        .iter()
-        .map(|l| {
-            (0..l.len())
-                .map(|i| l[i][0] * l[(i + 1) % l.len()][1] - l[i][1] * l[(i + 1) % l.len()][0])
-                .sum::<f64>()
-                / 2.0
-        })
-        .sum()
+    drawing.contours.iter().map(|l| loop_area(l)).sum()
+}
+
+/// Area inside a closed loop, negative if it runs clockwise.
+pub fn loop_area(l: &[P]) -> f64 {
+    (0..l.len())
+        .map(|i| l[i][0] * l[(i + 1) % l.len()][1] - l[i][1] * l[(i + 1) % l.len()][0])
+        .sum::<f64>()
+        / 2.0
 }
 
 /// What the outlines of the flap triangles say: sides that they share with triangles of the sheet, with each other, and
