@@ -285,7 +285,9 @@ pub(super) fn compare(
         let missing = missing.take(|_| slack.gap_mm);
         // At a corner each of its two sides may lie within the tolerance of the other.
         let repeated = repeated.take(|s| {
-            let joint = if s.corner { 2.0 * JOINT_MM } else { JOINT_MM };
+            // As JOINT_MM, for this tolerance.
+            let joint = 2.0 * slack.sideways_mm;
+            let joint = if s.corner { 2.0 * joint } else { joint };
             joint + cut.slack_mm
         });
         let ends = (
