@@ -6,7 +6,8 @@ use kurbo::Vec2;
 use proptest::prelude::*;
 
 use super::{
-    Declared, Finding, Rule, Slack, TOLERANCE_MM, compare_burnt, passes_of, read, verify, write,
+    Declared, Finding, GcodeError, Rule, Slack, TOLERANCE_MM, compare_burnt, passes_of, read,
+    verify, write,
 };
 use crate::base::ids::Id;
 use crate::linkage::{Handedness, Linkage, TriangleId};
@@ -14,7 +15,7 @@ use crate::machine::{self, Machine};
 use crate::material;
 use crate::material::PassOrder;
 use crate::pattern::{Label, Mark, MarkKind, Sheet, SheetOptions, Tip, placed, read_svg, svg};
-use crate::toolpath::{CornerSlowdown, CutOptions, plan};
+use crate::toolpath::{CornerSlowdown, CutOptions, Role, Toolpath, plan};
 
 /// The largest edge-connected part of a hexagon of cells without those of `removed`.
 fn patch(handedness: Handedness, removed: &BTreeSet<usize>) -> Linkage {
@@ -537,5 +538,78 @@ fn damage_to_a_torch_job_is_found_by_its_rule() {
             rules.contains(&rule),
             "{torch}, {from:?} → {to:?}: {rules:?}"
         );
+    }
+}
+
+#[test]
+fn constant_power_is_warned_of_and_what_a_torch_cannot_do_is_refused() {
+    let material = material::load(material::DEFAULT).unwrap();
+    let mut machine = machine::load(machine::DEFAULT).unwrap();
+    let setting = material.cut_for(&machine).unwrap();
+    let sheet = Sheet::new(
+        &patch(Handedness::Right, &BTreeSet::new()),
+        &SheetOptions::plain(1.0, setting.kerf_mm),
+    )
+    .unwrap();
+    let (mut sheet, _) = placed(&sheet, &machine, false).unwrap();
+    sheet.marks.push(name_mark(&sheet));
+    let marks = material.mark_for(&machine);
+    let mut options = CutOptions::of(&setting, &machine, marks.as_ref());
+    options.passes = 2;
+    let mut path = plan(&sheet, &options, [0.0, 0.0]).unwrap();
+    let dynamic = write(&path, &machine, &material).unwrap();
+    assert!(!dynamic.contains("warning") && !dynamic.contains("M3"));
+    let laser = machine.laser.as_mut().unwrap();
+    laser.power_mode = crate::machine::PowerMode::Constant;
+    laser.accept_beam_on_after_lost_link = true;
+    machine.validate().unwrap();
+    let constant = write(&path, &machine, &material).unwrap();
+    assert!(constant.contains("; warning: M3") && constant.contains("\nM3 S0\n"));
+    let verdict = verify(&constant, &machine, Some(&sheet), None).unwrap();
+    assert_eq!(verdict.findings, []);
+
+    let steel = material::load("steel-1.5").unwrap();
+    let torch = machine::load("plasma-linuxcnc").unwrap();
+    assert_eq!(
+        write(&path, &torch, &steel),
+        Err(GcodeError::Passes { passes: 2 })
+    );
+    path.cuts.iter_mut().for_each(|c| c.passes = 1);
+    assert!(matches!(
+        write(&path, &torch, &steel),
+        Err(GcodeError::Marks { .. })
+    ));
+    path.cuts.retain(|c| c.role != Role::Mark);
+    assert!(write(&path, &torch, &steel).is_ok());
+    assert!(matches!(
+        write(&path, &torch, &material),
+        Err(GcodeError::Cut(_))
+    ));
+    path.cuts[0].line.vertices[0].at.x = f64::NAN;
+    assert!(matches!(
+        write(&path, &torch, &steel),
+        Err(GcodeError::NotFinite { .. })
+    ));
+}
+
+/// What stands around the cuts is good by itself: nothing of a profile's own lines is a finding.
+#[test]
+fn the_frame_of_a_job_is_good_on_every_shipped_machine() {
+    for (name, _) in machine::shipped() {
+        let machine = machine::load(name).unwrap();
+        let material = material::shipped()
+            .map(|(m, _)| material::load(m).unwrap())
+            .find(|m| m.cut_for(&machine).is_ok())
+            .unwrap();
+        let empty = Toolpath {
+            cuts: vec![],
+            start: kurbo::Point::ORIGIN,
+            pierce_mm: None,
+            overcut_mm: 0.0,
+        };
+        let text = write(&empty, &machine, &material).unwrap();
+        let verdict = verify(&text, &machine, None, None).unwrap();
+        assert_eq!(verdict.findings, [], "{name}: {text}");
+        assert_eq!(super::machine_of(&text), Some(name));
     }
 }
