@@ -37,7 +37,9 @@ fn kagome(args: &[&str], folder: &Path) -> Output {
 }
 
 fn read(path: PathBuf) -> String {
-    std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+    // Of a binary file the bytes are compared as well as they can be: what is not text becomes a mark.
+    let bytes = std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    String::from_utf8_lossy(&bytes).into_owned()
 }
 
 fn stderr(output: &Output) -> String {

@@ -602,6 +602,7 @@ fn the_frame_of_a_job_is_good_on_every_shipped_machine() {
             .find(|m| m.cut_for(&machine).is_ok())
             .unwrap();
         let empty = Toolpath {
+            passes: 1,
             cuts: vec![],
             start: kurbo::Point::ORIGIN,
             pierce_mm: None,

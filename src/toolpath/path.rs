@@ -184,6 +184,8 @@ pub struct Toolpath {
     pub cuts: Vec<Cut>,
     /// Where the head is before the first, millimetres.
     pub start: Point,
+    /// How often each cut is gone over, all passes of all rounds together.
+    pub passes: u32,
     /// Diameter of the pierce hole where it is wider than the kerf, millimetres.
     pub pierce_mm: Option<f64>,
     /// How far contours are cut beyond their start, millimetres.
@@ -349,6 +351,7 @@ pub fn plan(
     Ok(Toolpath {
         cuts: planner.cuts,
         start,
+        passes: options.passes,
         pierce_mm,
         overcut_mm: options.overcut_mm,
     })

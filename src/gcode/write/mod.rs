@@ -355,9 +355,8 @@ impl Writer<'_> {
         self.remark(&format!("{MACHINE_LINE}{}", self.machine.name));
         self.remark(&format!("material {}", material.name));
         // The verifier must not guess this from what is burnt: a job that is doubled by mistake would pass.
-        if let Some(passes) = toolpath.cuts.iter().map(|c| c.passes).max()
-            && passes > 1
-        {
+        let passes = toolpath.passes;
+        if passes > 1 {
             self.remark(&format!("{PASSES_LINE}{passes}"));
         }
         let any = |of: &dyn Fn(&Cut) -> bool| toolpath.cuts.iter().any(of);
