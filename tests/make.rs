@@ -93,7 +93,11 @@ fn judge(out: &Path, name: &str) -> (sheet::Drawing, linkage::Findings) {
         .filter(|b| b.s == burnt.power)
         .map(|b| [b.from_mm, b.to_mm])
         .collect();
-    assert!(really.len() >= burnt.pieces.len() / 2);
+    let length = |pieces: &[[[f64; 2]; 2]]| -> f64 {
+        let far = |[a, b]: &[[f64; 2]; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        pieces.iter().map(far).sum()
+    };
+    assert!(length(&really) > 0.97 * length(&burnt.pieces));
     assert_eq!(
         sheet::compare(&drawing, &really, 0.02, 0.15),
         Vec::<String>::new()
@@ -215,6 +219,103 @@ fn scans_become_jobs() {
         ];
         make_and_judge(&args);
     }
+}
+
+/// A sheet larger than the stock becomes several, each with its own job, and all together they are the same linkage.
+#[test]
+#[ignore = "slow: .ci/run runs it on the release build"]
+fn a_sheet_larger_than_the_stock_is_divided() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = kagome(&["make", "sample:mask", "-q", "-o", "whole"], folder.path());
+    assert_eq!(whole.status.code(), Some(0), "{}", stderr(&whole));
+    let count = |name: &str, key: &str| {
+        let report: serde_json::Value =
+            serde_json::from_str(&read(folder.path().join(name).join("report.json"))).unwrap();
+        report.pointer(key).unwrap().as_u64().unwrap()
+    };
+    for (stock, least) in [("160x140", 2), ("90x80", 4)] {
+        let args = ["make", "sample:mask", "--stock", stock, "-q", "-o", stock];
+        let output = kagome(&args, folder.path());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let out = folder.path().join(stock);
+        let mut found = linkage::judge(
+            &read(out.join("linkage.obj")),
+            &read(out.join("layout.obj")),
+            2.0,
+        );
+        // Pieces on stock are turned by any angle against each other.
+        found
+            .faults
+            .retain(|f| !f.contains("do not turn by a multiple of 120"));
+        linkage::strict(&found).unwrap();
+        let (width, height) = stock.split_once('x').unwrap();
+        let (width, height): (f64, f64) = (width.parse().unwrap(), height.parse().unwrap());
+        let (mut sheets, mut triangles, mut slits, mut flap_slits) = (0, 0, 0, 0);
+        loop {
+            let number = if sheets == 0 {
+                String::new()
+            } else {
+                format!("-{}", sheets + 1)
+            };
+            let job = out.join(format!("job{number}.nc"));
+            if !job.is_file() {
+                break;
+            }
+            sheets += 1;
+            let drawing = sheet::read_drawing(&read(out.join(format!("pattern{number}.svg"))));
+            let burnt = sheet::burn(&read(job.clone()));
+            assert_eq!(burnt.faults, Vec::<String>::new());
+            assert_eq!(
+                sheet::compare(&drawing, &burnt.pieces, 0.011, 0.0),
+                Vec::<String>::new()
+            );
+            for p in burnt.pieces.iter().flatten() {
+                assert!(p[0] >= 5.0 && p[1] >= 5.0 && p[0] <= width - 5.0 && p[1] <= height - 5.0);
+            }
+            triangles += drawing.triangles.len();
+            slits += drawing.slits.len();
+            flap_slits += drawing.flap_slits;
+            // By itself, with the drawing that goes with it.
+            let verified = kagome(&["verify", &job.to_string_lossy()], folder.path());
+            assert_eq!(verified.status.code(), Some(0), "{}", stderr(&verified));
+        }
+        assert!(sheets >= least, "{sheets} sheets of {stock}");
+        assert_eq!(triangles as u64, count("whole", "/linkage/triangles"));
+        assert_eq!(slits - flap_slits, found.hinges - found.seam_hinges);
+        assert!(found.seam_hinges as u64 > count("whole", "/linkage/seam_edges"));
+        // The design brings the same sheets again.
+        let design = out.join("design.toml").to_string_lossy().into_owned();
+        let again = kagome(
+            &["make", &design, "-q", "-o", "again", "--force"],
+            folder.path(),
+        );
+        assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
+        let name = format!("job-{sheets}.nc");
+        assert_eq!(
+            read(out.join(&name)),
+            read(folder.path().join("again").join(&name))
+        );
+    }
+    let refused = kagome(
+        &[
+            "make",
+            "sample:mask",
+            "--stock",
+            "90x80",
+            "--undivided",
+            "-q",
+            "-o",
+            "none",
+        ],
+        folder.path(),
+    );
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        stderr(&refused).contains("there is room for 80.0 x 70.0 mm"),
+        "{}",
+        stderr(&refused)
+    );
+    assert!(!folder.path().join("none").exists());
 }
 
 #[test]

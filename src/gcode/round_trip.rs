@@ -18,13 +18,17 @@ use crate::toolpath::{CornerSlowdown, CutOptions, plan};
 
 /// The largest edge-connected part of a hexagon of cells without those of `removed`.
 fn patch(handedness: Handedness, removed: &BTreeSet<usize>) -> Linkage {
+    patch_of(12.0, handedness, removed)
+}
+
+fn patch_of(edge_mm: f64, handedness: Handedness, removed: &BTreeSet<usize>) -> Linkage {
     let mut cells = Linkage::hexagon_cells(3);
     let mut index = 0;
     cells.retain(|_| {
         index += 1;
         !removed.contains(&(index - 1))
     });
-    let all = Linkage::patch(12.0, handedness, &cells);
+    let all = Linkage::patch(edge_mm, handedness, &cells);
     let neighbours = all.neighbours();
     let mut part = vec![usize::MAX; cells.len()];
     let mut sizes = Vec::new();
@@ -51,7 +55,7 @@ fn patch(handedness: Handedness, removed: &BTreeSet<usize>) -> Linkage {
         .filter(|c| part[*c] == largest)
         .map(|c| cells[c])
         .collect();
-    Linkage::patch(12.0, handedness, &kept)
+    Linkage::patch(edge_mm, handedness, &kept)
 }
 
 fn job(linkage: &Linkage, passes: u32, mirror: bool) -> (Sheet, String, Machine) {
@@ -77,6 +81,22 @@ fn job(linkage: &Linkage, passes: u32, mirror: bool) -> (Sheet, String, Machine)
     (sheet, text, machine)
 }
 
+/// A letter on the first triangle.
+fn name_mark(sheet: &Sheet) -> Mark {
+    let corners = sheet.triangles[0];
+    let middle = (corners.iter().fold(Vec2::ZERO, |s, p| s + p.to_vec2()) / 3.0).to_point();
+    Mark {
+        kind: MarkKind::Name,
+        lines: vec![],
+        label: Some(Label {
+            text: "A1".into(),
+            at: middle,
+            up: Vec2::new(0.0, 1.0),
+            height_mm: 2.0,
+        }),
+    }
+}
+
 /// The same with every shape that a sheet may have, cut in every way.
 fn shaped(
     linkage: &Linkage,
@@ -93,18 +113,7 @@ fn shaped(
         ..SheetOptions::plain(0.8, 0.2)
     };
     let mut sheet = Sheet::new(linkage, &options).unwrap();
-    let corners = sheet.triangles[0];
-    let middle = (corners.iter().fold(Vec2::ZERO, |s, p| s + p.to_vec2()) / 3.0).to_point();
-    sheet.marks.push(Mark {
-        kind: MarkKind::Name,
-        lines: vec![],
-        label: Some(Label {
-            text: "A1".into(),
-            at: middle,
-            up: Vec2::new(0.0, 1.0),
-            height_mm: 2.0,
-        }),
-    });
+    sheet.marks.push(name_mark(&sheet));
     if tabs {
         sheet.tabs = sheet.even_tabs(3, 0.6);
     }
@@ -135,6 +144,33 @@ fn wide_cut(pierce_mm: f64, passes: u32, pass_order: PassOrder) -> CutOptions {
     }
 }
 
+/// A coarse sheet of steel for a plasma table, as its profiles say.
+fn torch_job(
+    machine_name: &str,
+    removed: &BTreeSet<usize>,
+    marked: bool,
+) -> (Sheet, String, Machine) {
+    let machine = machine::load(machine_name).unwrap();
+    let material = material::load("steel-1.5").unwrap();
+    let setting = material.cut_for(&machine).unwrap();
+    let linkage = patch_of(50.0, Handedness::Right, removed);
+    let mut sheet = Sheet::new(
+        &linkage,
+        &SheetOptions::plain(material.hinge_width_mm, setting.kerf_mm),
+    )
+    .unwrap();
+    if marked {
+        sheet.marks.push(name_mark(&sheet));
+    }
+    let (sheet, _) = placed(&sheet, &machine, false).unwrap();
+    let sheet = read_svg(&svg(&sheet)).unwrap();
+    let marks = material.mark_for(&machine);
+    let options = CutOptions::of(&setting, &machine, marks.as_ref());
+    let toolpath = plan(&sheet, &options, machine.park_mm()).unwrap();
+    let text = write(&toolpath, &machine, &material).unwrap();
+    (sheet, text, machine)
+}
+
 fn removed() -> impl Strategy<Value = BTreeSet<usize>> {
     proptest::collection::btree_set(0usize..54, 0..20)
 }
@@ -145,8 +181,21 @@ fn findings(text: &str, machine: &Machine, sheet: &Sheet, passes: u32) -> Vec<Fi
         .findings
 }
 
+const TORCHES: [&str; 3] = ["plasma-generic", "plasma-linuxcnc", "plasma-qtplasmac"];
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    #[test]
+    fn every_torch_cuts_the_sheet(removed in removed(), torch in 0usize..3, marked: bool) {
+        let (sheet, text, machine) = torch_job(TORCHES[torch], &removed, torch == 2 && marked);
+        let verdict = verify(&text, &machine, Some(&sheet), None).unwrap();
+        prop_assert_eq!(&verdict.findings, &[], "{}", text);
+        prop_assert_eq!(verdict.ligaments.unwrap().pieces, Some(1));
+        let program = super::read_as(&text, super::Dialect::of(&machine));
+        let on = text.lines().filter(|l| *l == "M3" || (l.starts_with("M3 ") && !l.contains("$1"))).count();
+        prop_assert_eq!(program.pierces.len(), on);
+    }
 
     #[test]
     fn what_we_write_is_what_the_sheet_wants(removed in removed(), left: bool, mirror: bool, passes in 1u32..4) {
@@ -257,7 +306,7 @@ fn damage_to_the_frame_of_the_job_is_found_by_its_rule() {
             Rule::LineTooLong,
         ),
         ("; slits", "; slits?", Rule::Syntax),
-        ("M5\n", "X700\nM5\n", Rule::OffBed),
+        ("M5\n", "G1 X700\nM5\n", Rule::OffBed),
         ("M5\n", "G2 X1 Y1\nM5\n", Rule::Syntax),
         ("G0 X", "X", Rule::Modes),
     ] {
@@ -299,11 +348,15 @@ fn no_line_is_longer_than_needed_and_modal_words_are_said_once() {
     assert!(text.lines().all(|l| l.len() < 60));
     let motion: Vec<&str> = text
         .lines()
-        .filter(|l| l.starts_with("G1") || l.starts_with("G0"))
+        .filter(|l| {
+            ["G0 ", "G1 ", "G2 ", "G3 "]
+                .iter()
+                .any(|g| l.starts_with(g))
+        })
         .collect();
     assert!(
         motion.windows(2).all(|w| w[0][..2] != w[1][..2]),
-        "G0 and G1 only where they change"
+        "how to move is said only where it changes"
     );
 }
 
@@ -427,4 +480,62 @@ fn the_m3_word_is_found_even_if_nothing_is_burnt() {
         found.iter().map(|f| (f.line, f.rule)).collect::<Vec<_>>(),
         [(Some(4), Rule::ConstantPower)]
     );
+}
+
+#[test]
+fn damage_to_a_torch_job_is_found_by_its_rule() {
+    for (torch, from, to, rule) in [
+        ("plasma-qtplasmac", "M3 $0 S1\n", "", Rule::Missing),
+        ("plasma-qtplasmac", "M5 $0\n", "", Rule::BurnOnRapid),
+        (
+            "plasma-qtplasmac",
+            "M3 $0 S1",
+            "M3 $0 S1\nG4 P1",
+            Rule::StandingBeam,
+        ),
+        ("plasma-qtplasmac", "M3 $0 S1", "M3 $1 S1", Rule::Engraving),
+        ("plasma-qtplasmac", "M67 E3 Q60", "M67 E3 Q160", Rule::Feed),
+        ("plasma-qtplasmac", "M67 E3 Q60", "M62 P3", Rule::Missing),
+        ("plasma-qtplasmac", "M67 E3 Q60", "M67 E2 Q60", Rule::Syntax),
+        ("plasma-qtplasmac", "M2\n", "", Rule::Syntax),
+        ("plasma-qtplasmac", ", fr=2600", "", Rule::Syntax),
+        (
+            "plasma-qtplasmac",
+            "F#<_hal[plasmac.cut-feed-rate]>",
+            "F[1+2]",
+            Rule::Feed,
+        ),
+        ("plasma-linuxcnc", "M3 S1\n", "", Rule::Missing),
+        (
+            "plasma-linuxcnc",
+            "G92 Z0\nG0 Z3.8\n",
+            "G0 Z-1\n",
+            Rule::Height,
+        ),
+        (
+            "plasma-linuxcnc",
+            "G1 Z1.5 F2000",
+            "G1 Z-1.5 F2000",
+            Rule::Height,
+        ),
+        ("plasma-linuxcnc", "G0 Z20", "G0 Z1", Rule::Height),
+        ("plasma-linuxcnc", "G4 P0.2", "G4 P200", Rule::StandingBeam),
+        ("plasma-linuxcnc", "G92 Z0", "G92 X0", Rule::Modes),
+        ("plasma-generic", "M5\n", "", Rule::BurnOnRapid),
+        ("plasma-generic", "(leads)\n", "", Rule::Stray),
+        ("plasma-generic", "M3\n", "M3\nM3\n", Rule::StandingBeam),
+        ("plasma-generic", "F2600", "F26000", Rule::Feed),
+    ] {
+        let (sheet, text, machine) = torch_job(torch, &BTreeSet::new(), false);
+        let damaged = text.replacen(from, to, 1);
+        assert_ne!(damaged, text, "the fixture changed: {from}");
+        let rules: Vec<Rule> = findings(&damaged, &machine, &sheet, 1)
+            .iter()
+            .map(|f| f.rule)
+            .collect();
+        assert!(
+            rules.contains(&rule),
+            "{torch}, {from:?} → {to:?}: {rules:?}"
+        );
+    }
 }

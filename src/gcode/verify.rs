@@ -6,7 +6,7 @@ use kurbo::Point;
 
 use super::compare::{Kind, NO_GAP_MM, Slack, Wanted, compare};
 use super::coverage::{Index, Segment};
-use super::interpret::{Program, read};
+use super::interpret::{Beam, Dialect, Program, read_as};
 use super::ligament::{Ligaments, Outside, check_order, check_pierces, distance, measure};
 use super::write::{Declared, passes_of};
 use crate::base::units::short;
@@ -36,6 +36,8 @@ pub enum Rule {
     BurnOnRapid,
     /// The beam is never on at rest.
     StandingBeam,
+    /// A torch cuts at one height, above the sheet, and travels higher.
+    Height,
     /// M3 only where the machine's profile accepts it.
     ConstantPower,
     /// Every burning move has a feed above 0 and within the machine's rates.
@@ -133,7 +135,7 @@ pub fn verify(
     sheet: Option<&Sheet>,
     passes: Option<u32>,
 ) -> Result<Verdict, ToolpathError> {
-    let program = read(text);
+    let program = read_as(text, Dialect::of(machine));
     let mut findings = program.findings.clone();
     check_lines(text, machine, &mut findings);
     check_moves(&program, machine, &mut findings);
@@ -175,7 +177,8 @@ pub fn verify(
         };
         compare(&burnt, &wanted, n, exact, &scrap, &mut findings);
         check_order(sheet, &wanted, &burnt, &mut findings);
-        let engraved = if declared.marks {
+        let scribed = program.moves.iter().any(|m| m.beam == Beam::Scribe);
+        let engraved = if declared.marks || scribed {
             engraved(&program, &wanted, &mut findings)
         } else {
             vec![false; burnt.len()]
@@ -184,7 +187,7 @@ pub fn verify(
             let starts = pierces(&program, &engraved);
             check_pierces(sheet, &outside, &starts, declared.pierce_mm, &mut findings);
         }
-        let cuts = if declared.marks {
+        let cuts = if declared.marks || scribed {
             burnt
                 .into_iter()
                 .zip(engraved)
@@ -219,6 +222,10 @@ fn check_lines(text: &str, machine: &Machine, findings: &mut Vec<Finding>) {
                     line.len()
                 ),
             ));
+        }
+        // A file may hold any remark.
+        if !machine.controller.is_streamed() {
+            continue;
         }
         // These act at once, wherever they stand: feed hold, resume, status, reset.
         if let Some(c) = line.chars().find(|c| "!~?\u{18}".contains(*c)) {
@@ -322,6 +329,11 @@ fn check_moves(program: &Program, machine: &Machine, findings: &mut Vec<Finding>
 
 /// Where the beam goes on to cut; `engraved` says of each burning move whether it marks.
 fn pierces(program: &Program, engraved: &[bool]) -> Vec<(Option<usize>, Point)> {
+    // A torch pierces wherever it is switched on, also where the cut before it ended.
+    if !program.pierces.is_empty() {
+        let all = program.pierces.iter();
+        return all.map(|&(line, at)| (Some(line), at)).collect();
+    }
     let mut starts = Vec::new();
     let mut burning = false;
     let mut marks = engraved.iter();
@@ -359,7 +371,10 @@ fn engraved(program: &Program, wanted: &Wanted, findings: &mut Vec<Finding>) -> 
     let burns: Vec<_> = program.moves.iter().filter(|m| m.burns()).collect();
     let marks: Vec<bool> = burns.iter().map(|m| of_mark(m)).collect();
     let energy = |m: &super::Move| m.power / m.feed_mm_per_min.max(f64::MIN_POSITIVE);
-    let cuts = burns.iter().zip(&marks).filter(|(_, mark)| !**mark);
+    let cuts = burns
+        .iter()
+        .zip(&marks)
+        .filter(|(m, mark)| !**mark && m.beam != Beam::Scribe);
     let gentlest = cuts.map(|(m, _)| energy(m)).fold(f64::INFINITY, f64::min);
     if let Some((m, _)) = burns
         .iter()
@@ -371,6 +386,20 @@ fn engraved(program: &Program, wanted: &Wanted, findings: &mut Vec<Finding>) -> 
             Rule::Engraving,
             format!(
                 "the mark near {} gets as much power a millimetre as a cut: it would go through",
+                place(m.to)
+            ),
+        ));
+    }
+    if let Some((m, _)) = burns
+        .iter()
+        .zip(&marks)
+        .find(|(m, mark)| !**mark && m.beam == Beam::Scribe)
+    {
+        findings.push(Finding::at(
+            m.line,
+            Rule::Engraving,
+            format!(
+                "the scribe goes to {}, where the sheet has no mark",
                 place(m.to)
             ),
         ));

@@ -4,7 +4,7 @@
 //! the simulated machine runs it through the sender that drives real ones; and what it burnt is compared with the
 //! sheet again. An objection of any of them means no job.
 
-use kurbo::Point;
+use kurbo::{Point, Vec2};
 use serde_json::{Value, json};
 
 use super::MakeError;
@@ -15,6 +15,7 @@ use crate::gcode::{self, Slack, compare_burnt};
 use crate::machine::{Machine, PowerMode};
 use crate::material::{CutSetting, Material};
 use crate::pattern::{self, Sheet};
+use crate::planner::{self, Motion, total_s};
 use crate::sim::{RehearsalSummary, Settings, rehearse};
 use crate::toolpath::{CutOptions, Heat, Role, Toolpath, plan, spacing};
 
@@ -29,10 +30,10 @@ pub(crate) struct CutResult {
     pub cut_length_mm: f64,
     /// Length moved with the beam off, millimetres.
     pub travel_mm: f64,
-    /// Time on the simulated machine, seconds.
+    /// Time on the simulated machine, or by the planner where there is none, seconds.
     pub machine_s: f64,
-    /// What the simulated machine did.
-    pub rehearsal: RehearsalSummary,
+    /// What the simulated machine did; none for a torch.
+    pub rehearsal: Option<RehearsalSummary>,
     /// Why the job must not run; empty if it may.
     pub objections: Vec<String>,
 }
@@ -91,6 +92,35 @@ pub(crate) fn cut(
     );
     progress.check()?;
 
+    let (machine_s, rehearsal) = if machine.controller.is_streamed() && machine.laser().is_some() {
+        let (time_s, summary) =
+            rehearsed(&gcode, sheet, machine, setting, &mut objections, progress)?;
+        (time_s, Some(summary))
+    } else {
+        // The simulated machine is a laser to which a job is streamed.
+        (estimated_s(&gcode, machine, setting), None)
+    };
+    let figures = toolpath.figures();
+    Ok(CutResult {
+        gcode,
+        cut_length_mm: figures.cut_length_mm,
+        travel_mm: figures.travel_mm,
+        machine_s,
+        rehearsal,
+        toolpath,
+        objections,
+    })
+}
+
+/// Runs the job on the simulated machine, and compares what that has burnt with the sheet: its time, s, and its figures.
+fn rehearsed(
+    gcode: &str,
+    sheet: &Sheet,
+    machine: &Machine,
+    setting: &CutSetting,
+    objections: &mut Vec<String>,
+    progress: &dyn Progress,
+) -> Result<(f64, RehearsalSummary), MakeError> {
     progress.start("rehearsing on the simulated machine", None);
     let rules = JobRules {
         allow_constant_power: machine
@@ -115,7 +145,7 @@ pub(crate) fn cut(
         sheet,
         &burnt,
         setting.passes,
-        &gcode::Declared::of(&gcode),
+        &gcode::Declared::of(gcode),
         slack(machine),
     )
     .map_err(MakeError::Toolpath)?;
@@ -137,16 +167,29 @@ pub(crate) fn cut(
             objections.push(format!("rehearsal: {what}"));
         }
     }
-    let figures = toolpath.figures();
-    Ok(CutResult {
-        gcode,
-        cut_length_mm: figures.cut_length_mm,
-        travel_mm: figures.travel_mm,
-        machine_s: rehearsal.time_s,
-        rehearsal: rehearsal.summary,
-        toolpath,
-        objections,
-    })
+    Ok((rehearsal.time_s, rehearsal.summary))
+}
+
+/// How long a torch takes, s: the planner's time for its motion, a stop and the pierce delay for every cut. What height
+/// control takes for its probing is not in it.
+fn estimated_s(gcode: &str, machine: &Machine, setting: &CutSetting) -> f64 {
+    let program = gcode::read_as(gcode, gcode::Dialect::of(machine));
+    let wait_s = setting.torch.map_or(0.0, |t| t.pierce_delay_s);
+    let mut motions = Vec::with_capacity(program.moves.len() + 2 * program.pierces.len());
+    let mut burning = false;
+    for m in &program.moves {
+        if m.burns() != burning {
+            burning = m.burns();
+            let wait_s = if burning { wait_s } else { 0.0 };
+            motions.push(Motion::Stop { wait_s });
+        }
+        let way = m.from.map_or(Vec2::ZERO, |from| m.to - from);
+        motions.push(Motion::Move(planner::Move {
+            delta_mm: [way.x, way.y, 0.0],
+            rate_mm_min: (!m.rapid).then_some(m.feed_mm_per_min),
+        }));
+    }
+    total_s(&motions, &Settings::of_machine(machine).limits())
 }
 
 /// A job made from a drawing.
