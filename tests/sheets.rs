@@ -218,9 +218,6 @@ fn the_price_of_heat_moves_cuts_apart_and_is_kept_in_the_design() {
     assert_eq!(file("cool", "job.nc"), file("again", "job.nc"));
 }
 
-/// Dialects that are not written yet: their machines take no part in the pairs below.
-const WITHOUT_DIALECT: [&str; 3] = ["plasma-generic", "plasma-linuxcnc", "plasma-qtplasmac"];
-
 /// A shallow cap of about 80 triangles, of a size that goes with the cut of a pair.
 fn small_sample(material: &material::Material, setting: &material::CutSetting) -> Vec<String> {
     // Twice what the hinge and the cut ask for, and room for the pierce.
@@ -287,7 +284,8 @@ fn judge_pair(machine: &str, material: &str) -> Fit {
         "{name}: {}",
         stderr(&verified)
     );
-    if setting.passes == 1 {
+    // The judge of pixels reads the words of lasers, and sees no difference between passes and strokes.
+    if m.laser().is_some() && setting.passes == 1 {
         measure(&folder.path().join("out"), &name);
     }
     fit
@@ -297,8 +295,9 @@ fn judge_pair(machine: &str, material: &str) -> Fit {
 fn judge_sigma(machine: &str, material: &str) {
     let folder = tempfile::tempdir().unwrap();
     let s = material::load(material).unwrap();
-    // A cap needs 1 + tan²(φ/2) without a cone: this one asks for a fifth more than there is.
-    let half = (1.2 * s.sigma.max - 1.0).sqrt().atan();
+    // A cap needs 1 + tan²(φ/2) without a cone: this one asks for far more than there is, because so few
+    // triangles are no smooth map.
+    let half = (1.5 * s.sigma.max - 1.0).sqrt().atan();
     let across_mm = 30.0 * (s.hinge_width_mm + 0.5);
     let sample = format!("sample:cap:half_angle_deg={}", (2.0 * half).to_degrees());
     let words = format!(
@@ -317,6 +316,7 @@ fn pairs_of_machine_and_material_make_a_sample_or_say_why_not() {
         ("co2-600x400", "acrylic-3", Fit::Compatible),
         ("fibre-300", "copper-0.2", Fit::Compatible),
         ("diode-400", "felt-3", Fit::Compatible),
+        ("plasma-linuxcnc", "steel-1.5", Fit::Compatible),
         ("fibre-300", "felt-3", Fit::OtherLaser),
         ("co2-600x400", "steel-1.5", Fit::OtherProcess),
         ("plasma-linuxcnc", "leather-1.6", Fit::OtherProcess),
@@ -338,9 +338,6 @@ fn every_machine_and_every_material_make_a_sample_or_say_why_not() {
                 material::load(material).unwrap(),
             );
             let fits = material::classify(&loaded.0, &loaded.1) == Fit::Compatible;
-            if fits && WITHOUT_DIALECT.contains(&machine) {
-                continue;
-            }
             judge_pair(machine, material);
             if fits {
                 first = first.or(Some(machine));

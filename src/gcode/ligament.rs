@@ -59,10 +59,12 @@ pub(super) fn measure(
                 b: slit.tip,
             };
             index.near(&spot, neck + meta.kerf_mm, &mut near);
-            // Only what is near the tip: farther in, the other arms of its own star are no neighbours.
+            // Only what is near the tip: farther in, the other arms of its own star are no neighbours, nor is a rim that it
+            // begins at, under 60° or more.
             let whole = slit.tip.distance(slit.tail);
             let around = meta.tip.radius_mm(meta.kerf_mm) - 0.5 * meta.kerf_mm;
-            let near_tip = neck.min((whole - meta.hinge_width_mm - meta.kerf_mm).max(around));
+            let root = (meta.hinge_width_mm + meta.kerf_mm) / 0.75f64.sqrt();
+            let near_tip = neck.min((whole - root).max(around));
             let is_own = |s: &Segment| {
                 [s.a, s.a.midpoint(s.b), s.b].iter().all(|p| {
                     own.iter()
