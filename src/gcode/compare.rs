@@ -286,6 +286,7 @@ pub(super) fn compare(
         // At a corner each of its two sides may lie within the tolerance of the other. Where a machine's steps add to the
         // tolerance, the ends of such a stretch are as uncertain.
         let steps_mm = (slack.sideways_mm - TOLERANCE_MM).max(0.0);
+        let wider = 1.0 + steps_mm / TOLERANCE_MM;
         let repeated = repeated.take(|s| {
             let joint = if s.corner { 2.0 * JOINT_MM } else { JOINT_MM };
             wider * joint + steps_mm + cut.slack_mm
