@@ -295,13 +295,13 @@ fn judge_pair(machine: &str, material: &str) -> Fit {
 fn judge_sigma(machine: &str, material: &str) {
     let folder = tempfile::tempdir().unwrap();
     let s = material::load(material).unwrap();
-    // A cap needs 1 + tan²(φ/2) without a cone: this one asks for far more than there is, because so few
-    // triangles are no smooth map.
+    // A cap needs 1 + tan²(φ/2) without a cone: this one asks for half as much again as there is, and is fine enough
+    // that nothing else is in the way.
     let half = (1.5 * s.sigma.max - 1.0).sqrt().atan();
-    let across_mm = 30.0 * (s.hinge_width_mm + 0.5);
+    let across_mm = 60.0 * (s.hinge_width_mm + 0.5);
     let sample = format!("sample:cap:half_angle_deg={}", (2.0 * half).to_degrees());
     let words = format!(
-        "make -q -o out {sample} --size {across_mm} --triangles 150 --cone none --dart none --machine {machine} --material {material}"
+        "make -q -o out {sample} --size {across_mm} --triangles 600 --cone none --dart none --machine {machine} --material {material}"
     );
     let made = kagome(&words.split(' ').collect::<Vec<_>>(), folder.path());
     let text = stderr(&made);
