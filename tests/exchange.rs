@@ -7,23 +7,15 @@
     reason = "a helper that fails, fails its test"
 )]
 
+mod judge;
+
 use std::path::Path;
 use std::process::{Command, Output};
 
+use judge::run::kagome;
 use kagome::linkage::{Handedness, Linkage};
 use kagome::pattern::{self, MarkOptions, Sheet, SheetOptions};
 use kagome::{machine, material};
-
-fn kagome(args: &[&str], folder: &Path) -> Output {
-    // The slow checks run the release build.
-    let program =
-        std::env::var("KAGOME_BIN").unwrap_or_else(|_| env!("CARGO_BIN_EXE_kagome").into());
-    Command::new(program)
-        .args(args)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
 
 fn says(output: &Output, code: i32, words: &[&str]) {
     let text = format!(

@@ -9,8 +9,8 @@
 mod judge;
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
+use judge::run::{kagome, stderr};
 use judge::{linkage, sheet};
 
 const ALL: [&str; 9] = [
@@ -25,25 +25,10 @@ const ALL: [&str; 9] = [
     "report.html",
 ];
 
-fn kagome(args: &[&str], folder: &Path) -> Output {
-    // The slow checks run the release build.
-    let program =
-        std::env::var("KAGOME_BIN").unwrap_or_else(|_| env!("CARGO_BIN_EXE_kagome").into());
-    Command::new(program)
-        .args(args)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
-
 fn read(path: PathBuf) -> String {
     // Of a binary file the bytes are compared as well as they can be: what is not text becomes a mark.
     let bytes = std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     String::from_utf8_lossy(&bytes).into_owned()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 /// Makes, and lets both judges look at the result.

@@ -10,29 +10,14 @@
 mod judge;
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
+use judge::run::{kagome, stderr};
 use judge::{raster, sheet};
 use kagome::material::Fit;
 use kagome::{machine, material};
 
-fn kagome(args: &[&str], folder: &Path) -> Output {
-    // The slow checks run the release build.
-    let program =
-        std::env::var("KAGOME_BIN").unwrap_or_else(|_| env!("CARGO_BIN_EXE_kagome").into());
-    Command::new(program)
-        .args(args)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
-
 fn read(path: PathBuf) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 fn shipped(kind: &str, name: &str) -> String {

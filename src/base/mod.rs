@@ -3,6 +3,7 @@
 //! - [`catalog`]: shipped profiles and profiles from files, by one name;
 //! - [`curve`]: lines of straight pieces and arcs;
 //! - [`ids`]: typed indices and the per-element containers that only they open;
+//! - [`plane`]: points, segments and polygons;
 //! - [`progress`]: how long work reports and how it is interrupted, without knowing a terminal;
 //! - [`atomic`]: outputs that appear complete or not at all;
 //! - [`document`]: TOML that a person wrote, read strictly and blamed exactly;
@@ -16,6 +17,7 @@ pub mod catalog;
 pub mod curve;
 pub mod document;
 pub mod ids;
+pub mod plane;
 pub mod progress;
 pub mod sparse;
 pub mod starting;

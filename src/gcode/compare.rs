@@ -6,6 +6,7 @@ use std::ops::Range;
 use kurbo::Point;
 
 use super::coverage::{Index, Pieces, Segment};
+use super::ligament::distance;
 use super::verify::{Finding, Rule, TOLERANCE_MM, place};
 use super::write::Declared;
 use crate::base::curve::Curve;
@@ -68,6 +69,10 @@ pub(super) struct WantedCut {
 pub(super) struct Wanted {
     pub segments: Vec<Segment>,
     pub cuts: Vec<WantedCut>,
+    /// The segments by place.
+    pub index: Index,
+    /// For each segment the cut that it belongs to.
+    owners: Vec<u32>,
 }
 
 impl Wanted {
@@ -76,6 +81,8 @@ impl Wanted {
         let mut wanted = Self {
             segments: Vec::with_capacity(sheet.slits.len()),
             cuts: Vec::with_capacity(sheet.slits.len()),
+            index: Index::new(Vec::new()),
+            owners: Vec::new(),
         };
         let kerf = sheet.metadata.kerf_mm;
         for slits in sheet.slits.chunk_by(|a, b| a.star == b.star) {
@@ -112,6 +119,7 @@ impl Wanted {
         if declared.marks {
             wanted.add_marks(sheet);
         }
+        wanted.index = Index::new(wanted.segments.clone());
         Ok(wanted)
     }
 
@@ -135,6 +143,8 @@ impl Wanted {
             });
         }
         if self.segments.len() > first {
+            let number = self.cuts.len() as u32;
+            self.owners.resize(self.segments.len(), number);
             self.cuts.push(WantedCut {
                 kind,
                 range: first..self.segments.len(),
@@ -145,13 +155,13 @@ impl Wanted {
         }
     }
 
-    /// For each segment the cut that it belongs to.
-    pub fn owners(&self) -> Vec<u32> {
-        let mut owners = vec![0; self.segments.len()];
-        for (n, cut) in self.cuts.iter().enumerate() {
-            owners[cut.range.clone()].fill(n as u32);
-        }
-        owners
+    /// The cuts that pass a point within the tolerance, one of several segments as often. `near` is scratch.
+    pub fn at<'a>(&'a self, p: Point, near: &'a mut Vec<u32>) -> impl Iterator<Item = usize> + 'a {
+        let spot = Segment { a: p, b: p };
+        self.index.near(&spot, TOLERANCE_MM, near);
+        near.iter()
+            .filter(move |n| distance(&spot, &self.index.segment(**n)) <= TOLERANCE_MM)
+            .map(|n| self.owners[*n as usize] as usize)
     }
 }
 
@@ -322,9 +332,8 @@ pub(super) fn compare(
             });
         }
     }
-    let wanted_index = Index::new(wanted.segments.clone());
     for (line, segment) in burnt {
-        wanted_index.along(segment, slack.sideways_mm, &mut pieces);
+        wanted.index.along(segment, slack.sideways_mm, &mut pieces);
         let length = segment.length();
         let mut stray: Option<(f64, Point)> = None;
         if length <= NO_GAP_MM {

@@ -13,9 +13,10 @@ use kurbo::{Point, Vec2};
 use super::compare::{Kind, Wanted};
 use super::coverage::{Index, Segment};
 use super::verify::{Finding, Rule, TOLERANCE_MM, place};
+use crate::base::plane;
 use crate::base::union::Union;
 use crate::base::units::short;
-use crate::pattern::{Contour, Sheet, Star};
+use crate::pattern::{Sheet, Star};
 
 /// How much narrower than asked a ligament may be, millimetres: rounding of four ends to a micrometre.
 const ROUNDING_MM: f64 = 0.003;
@@ -154,11 +155,7 @@ pub(super) fn distance(a: &Segment, b: &Segment) -> f64 {
             return 0.0;
         }
     }
-    let to = |p: Point, s: &Segment| {
-        let d = s.b - s.a;
-        let t = ((p - s.a).dot(d) / d.hypot2().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        p.distance(s.a.lerp(s.b, t))
-    };
+    let to = |p: Point, s: &Segment| plane::from_segment(p, s.a, s.b);
     to(a.a, b).min(to(a.b, b)).min(to(b.a, a)).min(to(b.b, a))
 }
 
@@ -220,7 +217,7 @@ fn pieces(sheet: &Sheet, intact: &[bool]) -> Option<usize> {
 /// which is where it may be.
 pub(super) fn check_pierces(
     sheet: &Sheet,
-    outside: &Outside,
+    outside: &Outside<'_>,
     starts: &[(Option<usize>, Point)],
     pierce_mm: f64,
     findings: &mut Vec<Finding>,
@@ -292,23 +289,13 @@ pub(super) fn check_order(
     burnt: &[(Option<usize>, Segment)],
     findings: &mut Vec<Finding>,
 ) {
-    let index = Index::new(wanted.segments.clone());
-    let owners = wanted.owners();
     // For each cut when it is first and last burnt, as numbers of burnt pieces.
     let mut when: Vec<Option<(usize, usize)>> = vec![None; wanted.cuts.len()];
     let mut near = Vec::new();
     for (n, (_, segment)) in burnt.iter().enumerate() {
         let middle = segment.a.midpoint(segment.b);
-        let spot = Segment {
-            a: middle,
-            b: middle,
-        };
-        index.near(&spot, TOLERANCE_MM, &mut near);
-        for &s in &near {
-            if distance(&spot, &index.segment(s)) <= TOLERANCE_MM {
-                let seen = &mut when[owners[s as usize] as usize];
-                *seen = Some(seen.map_or((n, n), |(first, _)| (first, n)));
-            }
+        for cut in wanted.at(middle, &mut near) {
+            when[cut] = Some(when[cut].map_or((n, n), |(first, _)| (first, n)));
         }
     }
     let rims: Vec<usize> = (0..wanted.cuts.len())
@@ -326,7 +313,9 @@ pub(super) fn check_order(
         let early = rims.iter().find(|r| {
             let inside = || {
                 let of = wanted.cuts[**r].contour.and_then(|n| sheet.contours.get(n));
-                of.is_some_and(|contour| only_one || contains(contour, at))
+                of.is_some_and(|contour| {
+                    only_one || plane::encloses(&contour.line.flattened(0.01), at)
+                })
             };
             when[**r].is_some_and(|(first, _)| first < last) && inside()
         });
@@ -346,32 +335,18 @@ pub(super) fn check_order(
     }
 }
 
-/// Whether a point lies inside a contour.
-fn contains(contour: &Contour, p: Point) -> bool {
-    let points = contour.line.flattened(0.01);
-    let n = points.len();
-    (0..n)
-        .filter(|&i| {
-            let (a, b) = (points[i], points[(i + 1) % n]);
-            (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
-        })
-        .count()
-        % 2
-        == 1
-}
-
 /// Everything outside what stays: where leads may burn.
-pub(super) struct Outside {
+pub(super) struct Outside<'a> {
     edges: Index,
     /// The same edges by height, for counting crossings.
     rows: HashMap<i64, Vec<u32>>,
     row_mm: f64,
-    wanted: Index,
+    wanted: &'a Index,
     half_mm: f64,
 }
 
-impl Outside {
-    pub fn new(sheet: &Sheet, wanted: &Wanted) -> Self {
+impl<'a> Outside<'a> {
+    pub fn new(sheet: &Sheet, wanted: &'a Wanted) -> Self {
         let mut edges = Vec::new();
         for contour in &sheet.contours {
             let points = contour.line.flattened(0.0005);
@@ -393,7 +368,7 @@ impl Outside {
             edges: Index::new(edges),
             rows,
             row_mm,
-            wanted: Index::new(wanted.segments.clone()),
+            wanted: &wanted.index,
             half_mm: 0.5 * sheet.metadata.kerf_mm,
         }
     }
@@ -442,8 +417,7 @@ impl Outside {
         let row = (p.y / self.row_mm).floor() as i64;
         let crossed = self.rows.get(&row).into_iter().flatten().filter(|n| {
             let e = self.edges.segment(**n);
-            (e.a.y > p.y) != (e.b.y > p.y)
-                && p.x < e.a.x + (p.y - e.a.y) / (e.b.y - e.a.y) * (e.b.x - e.a.x)
+            plane::crosses(e.a, e.b, p)
         });
         crossed.count() % 2 == 1
     }

@@ -5,9 +5,9 @@ use std::fmt;
 use kurbo::Point;
 
 use super::compare::{Kind, NO_GAP_MM, Slack, Wanted, compare};
-use super::coverage::{Index, Segment};
+use super::coverage::Segment;
 use super::interpret::{Beam, Dialect, Program, read_as};
-use super::ligament::{Ligaments, Outside, check_order, check_pierces, distance, measure};
+use super::ligament::{Ligaments, Outside, check_order, check_pierces, measure};
 use super::write::{Declared, passes_of};
 use crate::base::units::short;
 use crate::machine::{Machine, PowerMode};
@@ -169,8 +169,10 @@ pub fn verify(
                 )
             })
             .collect();
-        let outside = Outside::new(sheet, &wanted);
-        let scrap = |piece: &Segment| declared.leads && outside.is_scrap(piece);
+        let wide = declared.pierce_mm > sheet.metadata.kerf_mm;
+        let outside = (declared.leads || wide).then(|| Outside::new(sheet, &wanted));
+        let scrap =
+            |piece: &Segment| declared.leads && outside.as_ref().is_some_and(|o| o.is_scrap(piece));
         let exact = Slack {
             sideways_mm: TOLERANCE_MM,
             gap_mm: NO_GAP_MM,
@@ -183,9 +185,9 @@ pub fn verify(
         } else {
             vec![false; burnt.len()]
         };
-        if declared.pierce_mm > sheet.metadata.kerf_mm {
+        if let Some(outside) = outside.as_ref().filter(|_| wide) {
             let starts = pierces(&program, &engraved);
-            check_pierces(sheet, &outside, &starts, declared.pierce_mm, &mut findings);
+            check_pierces(sheet, outside, &starts, declared.pierce_mm, &mut findings);
         }
         let cuts = if declared.marks || scribed {
             burnt
@@ -350,22 +352,12 @@ fn pierces(program: &Program, engraved: &[bool]) -> Vec<(Option<usize>, Point)> 
 /// For each burning move whether it engraves a mark. A mark that gets as much energy a millimetre as the gentlest cut is a
 /// finding: it would go through.
 fn engraved(program: &Program, wanted: &Wanted, findings: &mut Vec<Finding>) -> Vec<bool> {
-    let index = Index::new(wanted.segments.clone());
-    let owners = wanted.owners();
     let mut near = Vec::new();
     let mut of_mark = |m: &super::Move| {
         let from = m.from.unwrap_or(m.to);
         let middle = from.midpoint(m.to);
-        let spot = Segment {
-            a: middle,
-            b: middle,
-        };
-        index.near(&spot, TOLERANCE_MM, &mut near);
-        let mut kinds = near
-            .iter()
-            .filter(|n| distance(&spot, &index.segment(**n)) <= TOLERANCE_MM)
-            .map(|n| wanted.cuts[owners[*n as usize] as usize].kind)
-            .peekable();
+        let cuts = wanted.at(middle, &mut near);
+        let mut kinds = cuts.map(|c| wanted.cuts[c].kind).peekable();
         kinds.peek().is_some() && kinds.all(|k| k == Kind::Mark)
     };
     let burns: Vec<_> = program.moves.iter().filter(|m| m.burns()).collect();
@@ -428,8 +420,8 @@ pub fn compare_burnt(
         .collect();
     let mut findings = Vec::new();
     let wanted = Wanted::new(sheet, declared)?;
-    let outside = Outside::new(sheet, &wanted);
-    let scrap = |piece: &Segment| declared.leads && outside.is_scrap(piece);
+    let outside = declared.leads.then(|| Outside::new(sheet, &wanted));
+    let scrap = |piece: &Segment| outside.as_ref().is_some_and(|o| o.is_scrap(piece));
     compare(&burnt, &wanted, passes, slack, &scrap, &mut findings);
     Ok(findings)
 }

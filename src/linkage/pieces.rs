@@ -46,12 +46,7 @@ pub(crate) fn flatten(laid: &[Laid], lattice: &Lattice, root: usize, price: Pric
         (i.round() as i32, j.round() as i32)
     });
     let (spots, pieces) = lay(&net, root, start, price);
-    let seam_edges = (0..net.twin.len())
-        .filter_map(|side| net.twin[side].map(|twin| (side, twin)))
-        .filter(|&(side, twin)| {
-            side < twin && beyond(&spots[side / 3], side, twin) != spots[twin / 3]
-        })
-        .count();
+    let seam_edges = seam_edges(&net, &spots);
     let mut there = HashMap::with_capacity(spots.len());
     let overlaps = (0..spots.len())
         .filter_map(|t| there.insert(middle(&spots[t]), t).map(|other| (other, t)))
@@ -67,6 +62,19 @@ pub(crate) fn flatten(laid: &[Laid], lattice: &Lattice, root: usize, price: Pric
         seam_edges,
         flaps: flaps::rows(&net, &spots, laid, lattice),
     }
+}
+
+/// Whether two neighbours lie side by side on the sheet.
+pub(super) fn joined(spots: &[[Spot; 3]], side: usize, twin: usize) -> bool {
+    beyond(&spots[side / 3], side, twin) == spots[twin / 3]
+}
+
+/// Lattice edges between neighbours that do not.
+pub(super) fn seam_edges(net: &Net, spots: &[[Spot; 3]]) -> usize {
+    (0..net.twin.len())
+        .filter_map(|side| net.twin[side].map(|twin| (side, twin)))
+        .filter(|&(side, twin)| side < twin && !joined(spots, side, twin))
+        .count()
 }
 
 /// Lattice corners of every triangle and the number of pieces.

@@ -11,7 +11,8 @@ use nalgebra::Point2;
 
 use super::flaps;
 use super::lattice::Lattice;
-use super::net::{Net, Spot, beyond};
+use super::net::{Net, Spot};
+use super::pieces::{joined, seam_edges};
 use super::types::{Cell, Linkage};
 use super::{Built, Flaps};
 
@@ -89,10 +90,7 @@ impl Built {
                 neighbours: laid.neighbours,
             })
             .collect();
-        let seam_edges = (0..net.twin.len())
-            .filter_map(|side| net.twin[side].map(|twin| (side, twin)))
-            .filter(|(side, twin)| side < twin && !joined(&spots, *side, *twin))
-            .count();
+        let seam_edges = seam_edges(&net, &spots);
         let flaps: Flaps = flaps::rows(&net, &spots, &self.laid, &lattice);
         Some(Built {
             linkage: Linkage::assemble(edge_mm, self.linkage.handedness, &cells),
@@ -103,11 +101,6 @@ impl Built {
             ..self.clone()
         })
     }
-}
-
-/// Whether two neighbours lie side by side on the sheet.
-fn joined(spots: &[[Spot; 3]], side: usize, twin: usize) -> bool {
-    beyond(&spots[side / 3], side, twin) == spots[twin / 3]
 }
 
 /// The pieces in which some triangles hang together on the sheet.

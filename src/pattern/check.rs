@@ -8,6 +8,7 @@ use rstar::primitives::{GeomWithData, Line};
 use rstar::{AABB, RTree};
 
 use super::sheet::{PatternError, Sheet};
+use crate::base::plane;
 
 /// What rounding in a file may take away, millimetres.
 const ROUNDING_MM: f64 = 0.003;
@@ -34,18 +35,6 @@ fn around([a, b]: [Point; 2], room: f64) -> AABB<[f64; 2]> {
     )
 }
 
-/// Distance of a point from a segment.
-fn from_segment(p: Point, [a, b]: [Point; 2]) -> f64 {
-    let d = b - a;
-    let length = d.hypot2();
-    let t = if length > 0.0 {
-        ((p - a).dot(d) / length).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
-    p.distance(a.lerp(b, t))
-}
-
 /// Where two segments cross, if they do.
 fn crossing([a, b]: [Point; 2], [c, d]: [Point; 2]) -> Option<Point> {
     let (u, v) = (b - a, d - c);
@@ -63,16 +52,12 @@ fn apart(s: [Point; 2], t: [Point; 2]) -> (f64, Point) {
     if let Some(at) = crossing(s, t) {
         return (0.0, at);
     }
-    let nearest = |p: Point| {
-        let d = s[1] - s[0];
-        let along = ((p - s[0]).dot(d) / d.hypot2().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        s[0].lerp(s[1], along)
-    };
+    let nearest = |p: Point| s[0].lerp(s[1], plane::nearest_part(s[0], s[1], p));
     [
-        (from_segment(s[0], t), s[0]),
-        (from_segment(s[1], t), s[1]),
-        (from_segment(t[0], s), nearest(t[0])),
-        (from_segment(t[1], s), nearest(t[1])),
+        (plane::from_segment(s[0], t[0], t[1]), s[0]),
+        (plane::from_segment(s[1], t[0], t[1]), s[1]),
+        (plane::from_segment(t[0], s[0], s[1]), nearest(t[0])),
+        (plane::from_segment(t[1], s[0], s[1]), nearest(t[1])),
     ]
     .into_iter()
     .fold((f64::INFINITY, s[0]), |a, b| if b.0 < a.0 { b } else { a })
@@ -112,7 +97,10 @@ impl Sheet {
                 }
                 let other = &self.slits[m];
                 let line = ends(near);
-                let mut least = (from_segment(slit.tip, line) - tip - half, slit.tip);
+                let mut least = (
+                    plane::from_segment(slit.tip, line[0], line[1]) - tip - half,
+                    slit.tip,
+                );
                 let tips = slit.tip.distance(other.tip) - 2.0 * tip;
                 if tips < least.0 {
                     least.0 = tips;
@@ -142,7 +130,7 @@ impl Sheet {
             let own = [slit.tail, slit.tip];
             for near in tree.locate_in_envelope_intersecting(around(own, room)) {
                 let line = ends(near);
-                let width = from_segment(slit.tip, line) - tip;
+                let width = plane::from_segment(slit.tip, line[0], line[1]) - tip;
                 if narrow(width) {
                     return Err(thin(slit.tip, width, "the contour"));
                 }

@@ -18,6 +18,7 @@ use super::mark::{Label, Mark, MarkKind};
 use super::sheet::{Sheet, flat_vertices};
 use crate::base::curve::Curve;
 use crate::base::ids::{Id as _, Per};
+use crate::base::plane;
 use crate::base::union::Union;
 use crate::linkage::{Colour, Linkage, TriangleId};
 
@@ -186,8 +187,7 @@ impl<'a> Marker<'a> {
     }
 
     fn middle(&self, t: TriangleId) -> Point {
-        let [a, b, c] = self.corners(t).map(Point::to_vec2);
-        ((a + b + c) / 3.0).to_point()
+        plane::centroid(&self.corners(t))
     }
 
     /// The largest place for a form in a triangle: the middle of its text and its height.

@@ -9,6 +9,7 @@ use kurbo::{Point, Rect};
 
 use super::place::Motion;
 use super::sheet::{PatternError, Sheet, Slit};
+use crate::base::plane;
 
 /// Cells along the longer side of the stock.
 const CELLS: f64 = 400.0;
@@ -56,7 +57,7 @@ impl Sheet {
         let part_of = |p: Point| -> usize {
             let hit = (0..outlines.len()).find(|n| {
                 let (bounds, points) = &outlines[*n];
-                bounds.contains(p) && crossings(points, p) % 2 == 1
+                bounds.contains(p) && plane::encloses(points, p)
             });
             hit.unwrap_or_else(|| {
                 let away = |n: &usize| {
@@ -68,10 +69,6 @@ impl Sheet {
                     .min_by(|a, b| away(a).total_cmp(&away(b)))
                     .unwrap_or(0)
             })
-        };
-        let middle = |t: &[Point; 3]| {
-            let sum = t.iter().fold(kurbo::Vec2::ZERO, |s, p| s + p.to_vec2());
-            (sum / 3.0).to_point()
         };
         let mut parts: Vec<Sheet> = rims
             .iter()
@@ -97,12 +94,12 @@ impl Sheet {
         }
         let mut numbers = Vec::with_capacity(self.triangles.len());
         for triangle in &self.triangles {
-            let part = part_of(middle(triangle));
+            let part = part_of(plane::centroid(triangle));
             parts[part].triangles.push(*triangle);
             numbers.push(part);
         }
         for flap in &self.flaps {
-            parts[part_of(middle(flap))].flaps.push(*flap);
+            parts[part_of(plane::centroid(flap))].flaps.push(*flap);
         }
         for mark in &self.marks {
             let at = mark.strokes().first().and_then(|l| l.start());
@@ -166,16 +163,6 @@ pub fn fits_stock(points: &[Point], around_mm: f64, stock: &StockArea) -> bool {
             .inflate(around, around);
         b.width() <= stock.free.width() && b.height() <= stock.free.height()
     })
-}
-
-fn crossings(points: &[Point], p: Point) -> usize {
-    let n = points.len();
-    (0..n)
-        .filter(|&i| {
-            let (a, b) = (points[i], points[(i + 1) % n]);
-            (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
-        })
-        .count()
 }
 
 /// Cells of a rectangle, one bit each, row by row.
@@ -440,7 +427,7 @@ mod tests {
                         for q in points(other) {
                             assert!(p.distance(q) >= 2.0 - 1e-9);
                         }
-                        assert_eq!(crossings(&points(other), p) % 2, 0, "one lies on the other");
+                        assert!(!plane::encloses(&points(other), p), "one lies on the other");
                     }
                 }
             }

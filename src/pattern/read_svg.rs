@@ -15,6 +15,7 @@ use super::path_data::{self, LARGEST_MM, close, curves, similarity};
 use super::sheet::{Contour, Sheet, SheetMetadata, Slit, Tab, Tip};
 use super::svg::{CONTOUR, CORNER_RADIUS, FLAP, FLAPS, FORMAT, GUIDE, MARKS, SLITS, TIP_RADIUS};
 use crate::base::curve::Curve;
+use crate::base::plane;
 use crate::base::units::short;
 
 /// Millimetres to one pixel of SVG.
@@ -655,7 +656,7 @@ fn orient(contours: &mut [Contour], told: &[Option<bool>]) {
             };
             let around = (0..loops.len())
                 .filter(|&m| m != n && boxes[m].is_some_and(|b| b.contains(p)))
-                .filter(|&m| inside(p, &loops[m]));
+                .filter(|&m| plane::encloses(&loops[m], p));
             around.count() % 2 == 0
         });
         let contour = &mut contours[n];
@@ -664,18 +665,6 @@ fn orient(contours: &mut [Contour], told: &[Option<bool>]) {
             contour.line = contour.line.reversed();
         }
     }
-}
-
-/// Whether a point lies inside a closed line.
-fn inside(p: Point, around: &[Point]) -> bool {
-    let mut odd = false;
-    for (i, a) in around.iter().enumerate() {
-        let b = around[(i + 1) % around.len()];
-        if (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) {
-            odd = !odd;
-        }
-    }
-    odd
 }
 
 /// Slits star by star. A star are the slits that begin at one point; those that the file numbers keep the order of their

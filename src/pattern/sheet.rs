@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use kurbo::{Point, Rect, Vec2};
+use kurbo::{Point, Rect};
 
 use super::contour;
 use super::ligament::Ligament;
@@ -14,6 +14,7 @@ use super::mark::Mark;
 use super::star;
 use crate::base::curve::Curve;
 use crate::base::ids::{Id, Per};
+use crate::base::plane;
 use crate::base::union::Union;
 use crate::linkage::{Flaps, Linkage, Triangle, TriangleId};
 
@@ -566,13 +567,9 @@ fn alignment_holes(
     places.extend(flaps.flaps.iter().map(|f| f.double.index()));
     places.sort_unstable();
     places.dedup();
-    let middle = |t: &[Point; 3]| {
-        let sum: Vec2 = t.iter().fold(Vec2::ZERO, |s, p| s + p.to_vec2());
-        (sum / 3.0).to_point()
-    };
     let hole = |t: usize| Contour {
         line: Curve::circle(
-            middle(&triangles[t]),
+            plane::centroid(&triangles[t]),
             0.5 * options.alignment_hole_mm,
             false,
         ),
@@ -647,8 +644,6 @@ pub(super) fn flat_vertices(
 /// On one lattice, where sheets lie, the converse holds too.
 fn check_overlap(triangles: &[[Point; 3]], edge_mm: f64) -> Result<(), PatternError> {
     let least = edge_mm / 3f64.sqrt() * (1.0 - 1e-6);
-    let centroid =
-        |t: &[Point; 3]| ((t[0].to_vec2() + t[1].to_vec2() + t[2].to_vec2()) / 3.0).to_point();
     let cell = |p: Point| {
         (
             (p.x / edge_mm).floor() as i64,
@@ -657,11 +652,11 @@ fn check_overlap(triangles: &[[Point; 3]], edge_mm: f64) -> Result<(), PatternEr
     };
     let mut grid: BTreeMap<(i64, i64), Vec<u32>> = BTreeMap::new();
     for (i, t) in triangles.iter().enumerate() {
-        let here = centroid(t);
+        let here = plane::centroid(t);
         let (x, y) = cell(here);
         for near in (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| (x, y))) {
             for &j in grid.get(&near).into_iter().flatten() {
-                if centroid(&triangles[j as usize]).distance(here) < least {
+                if plane::centroid(&triangles[j as usize]).distance(here) < least {
                     return Err(PatternError::Overlap {
                         first: TriangleId(j),
                         second: TriangleId::from_index(i),

@@ -5,6 +5,7 @@ use kurbo::Point;
 
 use super::path::ToolpathError;
 use crate::base::curve::{Curve, Piece, Vertex};
+use crate::base::plane;
 use crate::pattern::{Contour, Tab};
 
 /// Largest distance between an arc and the straight pieces that stand for it where only straight ones will do. A fifth
@@ -80,9 +81,7 @@ fn left_out(contour: &Curve, outline: &Curve, kerf_mm: f64) -> Option<Point> {
         let m = beam.len();
         let hit = (0..m).map(|k| (last + k) % m).find(|&i| {
             let (a, b) = (beam[i], beam[(i + 1) % m]);
-            let d = b - a;
-            let t = ((p - a).dot(d) / d.hypot2()).clamp(0.0, 1.0);
-            p.distance(a.lerp(b, t)) <= limit
+            plane::from_segment(p, a, b) <= limit
         });
         last = hit.unwrap_or(last);
         hit.is_some()
@@ -168,10 +167,7 @@ const SHORTEST_STRETCH_MM: f64 = 0.1;
 /// Where along a piece, 0 to 1, a point is nearest.
 fn nearest_part(piece: &Piece, p: Point) -> f64 {
     match piece.arc() {
-        None => {
-            let d = piece.to - piece.from;
-            ((p - piece.from).dot(d) / d.hypot2().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
-        }
+        None => plane::nearest_part(piece.from, piece.to, p),
         Some(arc) => {
             let turn = ((p - arc.centre).atan2() - arc.start) * arc.sweep.signum();
             let part = turn.rem_euclid(std::f64::consts::TAU) / arc.sweep.abs();

@@ -11,6 +11,7 @@ use rstar::{AABB, RTree};
 use super::kerf::CHORD_ERROR_MM;
 use super::path::{CutOptions, ToolpathError};
 use crate::base::curve::{Curve, Piece, Vertex};
+use crate::base::plane;
 use crate::pattern::{Contour, Sheet};
 
 /// Angles between a lead and the cut that are tried, radians: a slant leaves the least mark, straight on needs the least
@@ -29,6 +30,11 @@ const WAYS: [f64; 7] = [0.0, 0.26, -0.26, 0.52, -0.52, 0.79, -0.79];
 /// The finished edges of a sheet by place.
 pub(super) struct Scrap {
     edges: RTree<GeomWithData<Line<[f64; 2]>, u32>>,
+}
+
+fn ends(line: &Line<[f64; 2]>) -> (Point, Point) {
+    let point = |[x, y]: [f64; 2]| Point::new(x, y);
+    (point(line.from), point(line.to))
 }
 
 impl Scrap {
@@ -54,14 +60,8 @@ impl Scrap {
         let near = AABB::from_corners([p.x - limit, p.y - limit], [p.x + limit, p.y + limit]);
         let mut least = limit;
         for edge in self.edges.locate_in_envelope_intersecting(near) {
-            let line = edge.geom();
-            let (a, b) = (
-                Point::new(line.from[0], line.from[1]),
-                Point::new(line.to[0], line.to[1]),
-            );
-            let d = b - a;
-            let t = ((p - a).dot(d) / d.hypot2().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            least = least.min(p.distance(a.lerp(b, t)));
+            let (a, b) = ends(edge.geom());
+            least = least.min(plane::from_segment(p, a, b));
         }
         least
     }
@@ -70,9 +70,8 @@ impl Scrap {
     fn is_part(&self, p: Point) -> bool {
         let ray = AABB::from_corners([p.x, p.y], [f64::MAX, p.y]);
         let crossed = self.edges.locate_in_envelope_intersecting(ray).filter(|e| {
-            let (a, b) = (e.geom().from, e.geom().to);
-            (a[1] > p.y) != (b[1] > p.y)
-                && p.x < a[0] + (p.y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+            let (a, b) = ends(e.geom());
+            plane::crosses(a, b, p)
         });
         crossed.count() % 2 == 1
     }

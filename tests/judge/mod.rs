@@ -1,4 +1,5 @@
-//! Judges that know file formats and nothing of the program, so that the tests can hold it to its word.
+//! Judges that know file formats and nothing of the program, so that the tests can hold it to its word; and how they run
+//! it.
 
 #![allow(
     dead_code,
@@ -13,4 +14,5 @@
 
 pub mod linkage;
 pub mod raster;
+pub mod run;
 pub mod sheet;
