@@ -137,6 +137,7 @@ fn the_ring_with_flaps_is_drawn_and_cut_as_ever() {
                 colour,
                 flat: triangle.flat,
                 neighbours,
+                trim: None,
             }
         })
         .collect();
@@ -172,6 +173,7 @@ fn the_ring_with_flaps_is_drawn_and_cut_as_ever() {
                 colour: Colour::Down,
                 flat: beyond(&list[number(0, 0, Colour::Down)]),
                 neighbours: [None, Some((count + 2, 0)), Some((count, 1))],
+                trim: None,
             },
             number(0, 0, Colour::Down),
         ),

@@ -99,10 +99,56 @@ fn ligaments_are_as_wide_as_asked_and_the_sheet_stays_in_one_piece_to_the_rim() 
         "sample:cap --triangles 60 --corner-radius 0.8 --pattern left",
         "sample:cap --triangles 60 --tip teardrop:0.5 --corner-radius 0.8 --kerf 0.4 --hinge 0.7",
         "sample:vase --sigma 2 --triangles 100 --alignment-holes 3 --tabs 4:1",
+        "sample:cap --triangles 60 --rim smooth --hinge 0.6",
         "sample:bump --cone auto --remove 4 --sigma 2 --triangles 150 --cool 20",
     ] {
         assert!(make_and_measure(words) > 50, "{words}");
     }
+}
+
+#[test]
+fn a_smooth_rim_trims_triangles_and_its_design_gives_the_same_bytes_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let output = kagome(args, folder.path());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    };
+    let smooth = ["--rim", "smooth", "--hinge", "0.6", "--triangles", "200"];
+    let mut args = vec!["make", "sample:cap", "--quiet", "-o", "smooth"];
+    args.extend(smooth);
+    run(&args);
+    run(&["make", "smooth/design.toml", "--quiet", "-o", "again"]);
+    let at = |dir: &str, file: &str| std::fs::read(folder.path().join(dir).join(file)).unwrap();
+    for file in [
+        "design.toml",
+        "layout.obj",
+        "linkage.obj",
+        "pattern.svg",
+        "job.nc",
+    ] {
+        assert!(at("smooth", file) == at("again", file), "{file}");
+    }
+    let figures: serde_json::Value = serde_json::from_slice(&at("smooth", "report.json")).unwrap();
+    let trimmed = figures["linkage"]["trimmed_at_rim"].as_u64().unwrap();
+    assert!(trimmed > 0);
+    // In space every triangle is whole, near the surface that was continued under it.
+    let found = judge::linkage::judge(
+        &read(folder.path().join("smooth/linkage.obj")),
+        &read(folder.path().join("smooth/layout.obj")),
+        1.8,
+    );
+    judge::linkage::strict(&found).unwrap();
+    // The part is no larger than its triangles, and smaller by what is cut off.
+    let drawing = sheet::read_drawing(&read(folder.path().join("smooth/pattern.svg")));
+    let area: f64 = drawing.contours.iter().map(|l| sheet::loop_area(l)).sum();
+    let triangles: f64 = drawing
+        .triangles
+        .iter()
+        .map(|t| sheet::loop_area(t).abs())
+        .sum();
+    let each = triangles / drawing.triangles.len() as f64;
+    let lost = (triangles - area) / each;
+    assert!(lost > 0.0 && lost < trimmed as f64, "{lost} of {trimmed}");
 }
 
 /// Every hinge of a sheet as makers cut it.

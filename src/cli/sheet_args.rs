@@ -1,8 +1,8 @@
 //! Options for the shapes of what is cut and for the sheets that it is cut from.
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
-use crate::job::{COOL_REACH_MM, SheetWish, TAB_WIDTH_MM};
+use crate::job::{COOL_REACH_MM, RimWish, SheetWish, TAB_WIDTH_MM};
 use crate::pattern::Tip;
 use crate::toolpath::Heat;
 
@@ -15,6 +15,10 @@ pub struct SheetArgs {
     /// Refuse a sheet that does not fit, in place of dividing it into pieces with flaps
     #[arg(long)]
     undivided: bool,
+    /// Where the sheet ends: along the edges of whole triangles, or smooth, along the rim of the surface, through every
+    /// triangle that keeps two hinges
+    #[arg(long, value_enum, default_value = "lattice", hide_default_value = true)]
+    rim: Rim,
     /// Ends of the slits: plain as the beam leaves them, round:R or teardrop:R with a finished radius in millimetres
     /// [default: the material's]
     #[arg(long, value_name = "SHAPE", value_parser = tip)]
@@ -34,12 +38,22 @@ pub struct SheetArgs {
     cool: Option<Heat>,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Rim {
+    Lattice,
+    Smooth,
+}
+
 impl SheetArgs {
     /// What is asked for.
     pub fn wish(&self) -> SheetWish {
         SheetWish {
             stock_mm: self.stock,
             divide: !self.undivided,
+            rim: match self.rim {
+                Rim::Lattice => RimWish::Lattice,
+                Rim::Smooth => RimWish::Smooth { skirt_mm: None },
+            },
             tip: self.tip,
             corner_radius_mm: self.corner_radius,
             alignment_hole_mm: self.alignment_holes,
@@ -54,6 +68,7 @@ impl SheetArgs {
         [
             (self.stock.is_some(), "--stock"),
             (self.undivided, "--undivided"),
+            (self.rim != Rim::Lattice, "--rim"),
             (self.tip.is_some(), "--tip"),
             (self.corner_radius.is_some(), "--corner-radius"),
             (self.alignment_holes != 0.0, "--alignment-holes"),

@@ -49,6 +49,10 @@ pub(super) fn measure(
     for slits in sheet.slits.chunk_by(|a, b| a.star == b.star) {
         let star = Star::new(slits, meta);
         for (slit, arm) in slits.iter().zip(&star.arms) {
+            if slit.through {
+                intact.push(false);
+                continue;
+            }
             tips += 1;
             let points = arm.outwards().flattened(0.0005);
             let own: Vec<Segment> = points
@@ -178,7 +182,13 @@ fn pieces(sheet: &Sheet, intact: &[bool]) -> Option<usize> {
     let mut slits: HashMap<(i64, i64), Vec<(Point, usize)>> = HashMap::new();
     for (n, slit) in sheet.slits.iter().enumerate() {
         let d = slit.tip - slit.tail;
-        let middle = slit.tail + d * (0.5 * edge / d.hypot());
+        // From the end that is where the lattice has it: the tail may begin at a smooth rim.
+        let d = d / d.hypot();
+        let middle = if slit.through {
+            slit.tail + d * (0.5 * edge)
+        } else {
+            slit.tip + d * (sheet.metadata.neck_mm() - 0.5 * edge)
+        };
         slits.entry(key(middle)).or_default().push((middle, n));
     }
     let mut sides: HashMap<(i64, i64), Vec<(Point, usize)>> = HashMap::new();
@@ -236,6 +246,9 @@ pub(super) fn check_pierces(
             a: slit.tail,
             b: slit.tip,
         });
+        if slit.through {
+            continue;
+        }
         let d = slit.tip - slit.tail;
         let Some(d) = (d.hypot() > 0.0).then(|| d / d.hypot()) else {
             continue;

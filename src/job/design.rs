@@ -9,7 +9,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::MakeError;
-use super::request::{ConePlace, ConeWish, DartWish, FlapWish, Request, SheetWish, Source};
+use super::request::{
+    ConePlace, ConeWish, DartWish, FlapWish, Request, RimWish, SheetWish, Source,
+};
 use crate::base::document::{Complaint, Document, ranged};
 use crate::conformal::Sizing;
 use crate::linkage::Handedness;
@@ -108,6 +110,10 @@ pub struct SheetChoice {
     /// True if a sheet that does not fit is refused and not divided.
     #[serde(default, skip_serializing_if = "is_false")]
     pub undivided: bool,
+    /// How far the surface is continued to cut the sheet along its smooth rim, millimetres; absent: its edge follows the
+    /// triangles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub smooth_rim_skirt_mm: Option<f64>,
     /// Shape of the slits' tips; absent: as the beam leaves them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip: Option<TipShape>,
@@ -148,6 +154,10 @@ impl SheetChoice {
         SheetWish {
             stock_mm: self.stock_mm,
             divide: !self.undivided,
+            rim: match self.smooth_rim_skirt_mm {
+                None => RimWish::Lattice,
+                skirt_mm => RimWish::Smooth { skirt_mm },
+            },
             tip: Some(match self.tip {
                 None | Some(TipShape::Plain) => Tip::Plain,
                 Some(TipShape::Round) => Tip::Round { radius_mm },
@@ -349,6 +359,9 @@ impl Design {
         ranged("sheet.kerf_mm", self.sheet.kerf_mm, 0.0, 20.0)?;
         for size in self.sheet.stock_mm.into_iter().flatten() {
             ranged("sheet.stock_mm", size, 1.0, 1e5)?;
+        }
+        if let Some(skirt) = self.sheet.smooth_rim_skirt_mm {
+            ranged("sheet.smooth_rim_skirt_mm", skirt, 1e-3, 1e5)?;
         }
         ranged("sheet.tip_radius_mm", self.sheet.tip_radius_mm, 0.0, 100.0)?;
         let wide = self.sheet.tip.is_some_and(|tip| tip != TipShape::Plain);

@@ -163,9 +163,10 @@ impl Explored {
         let material = crate::material::load(&request.material).map_err(MakeError::Material)?;
         let machine = crate::machine::load(&request.machine).map_err(MakeError::Machine)?;
         let setting = material.cut_for(&machine).map_err(MakeError::Cut)?;
-        let stock = stock(request, &material, &machine, &setting)?;
+        let mut stock = stock(request, &material, &machine, &setting)?;
+        stock.rim = self.loaded.rim(&stock.options);
         let map = self.best()?;
-        let laid = lay_out(request, map, &[], stock.sigma, progress)?;
+        let laid = lay_out(request, map, &[], &stock, progress)?;
         let taken = Taken {
             flat: &laid.flat,
             darts: &map.ground.darts,

@@ -1,23 +1,31 @@
 //! Reading what a request names: the surface, its hash, and cones, darts and cuts by vertices of it.
 
+use std::sync::Arc;
+
 use nalgebra::Point3;
 use sha2::{Digest as _, Sha256};
 
 use super::MakeError;
 use super::design::{ConeChoice, CutChoice, DartChoice};
 use super::make::title;
-use super::request::{ConePlace, ConeWish, DartWish, Request, Source};
+use super::request::{ConePlace, ConeWish, DartWish, Request, RimWish, Source};
+use super::shape::Rim;
 use super::targets::{Target, Targets, check_match, follow};
-use crate::conformal::{Cone, Dart, vertex_from_number};
+use crate::base::ids::Id as _;
+use crate::conformal::{Cone, Dart, Sizing, vertex_from_number};
+use crate::linkage::SmoothRim;
 use crate::mesh::{
-    Closest, ClosestPoint, Import, ImportOptions, Sample, Surface, Unit, Units, VertexId,
-    import_bytes, insert_point,
+    Closest, ClosestPoint, FaceId, HalfedgeId, Import, ImportOptions, Sample, Surface, Unit, Units,
+    VertexId, import_bytes, insert_point, skirt,
 };
+use crate::pattern::SheetOptions;
 
 /// A surface with the decisions about it.
 pub(crate) struct Loaded {
-    /// The surface, with a vertex at every cone asked for by point.
+    /// The surface, with a vertex at every cone asked for by point; continued beyond its rims where those are to be smooth.
     pub import: Import,
+    /// That continuation.
+    pub skirt: Option<Skirt>,
     /// SHA-256 of the mesh file, hexadecimal.
     pub sha256: Option<String>,
     /// Cones, as vertices; `None` while the program decides.
@@ -36,6 +44,24 @@ pub(crate) struct Loaded {
     pub also: Vec<Also>,
 }
 
+/// A surface's continuation beyond its rims.
+pub(crate) struct Skirt {
+    /// How far it reaches, millimetres.
+    pub width_mm: f64,
+    /// By face: whether it belongs to it.
+    pub beyond: Vec<bool>,
+    /// The surface without it.
+    pub inner: Arc<Surface>,
+    /// Rims without, by number from 0: the triangles' edges are the rim there.
+    pub bare_rims: Vec<usize>,
+}
+
+/// A skirt is this much wider than a triangle's edge: what is cut off of a triangle reaches less than an edge beyond.
+const SKIRT_IN_EDGES: f64 = 1.2;
+
+/// How far a pattern opens on average, about: an edge on the sheet is so much longer a way on the surface.
+const MEAN_OPENING: f64 = 1.3;
+
 /// A further surface.
 pub(crate) struct Also {
     /// What a person calls it.
@@ -50,6 +76,22 @@ pub(crate) struct Also {
 pub(crate) const MOST_SURFACES: usize = 9;
 
 impl Loaded {
+    /// Where the sheet is cut along the surface's own rim: beyond the tips of slits, which are a neck from their vertex. From
+    /// a tip to the arm beside it and to a rim there it is as far, and more than a hinge's width.
+    pub fn rim(&self, options: &SheetOptions) -> Option<Rim> {
+        let skirt = self.skirt.as_ref()?;
+        // Of the edge only the neck's check makes use.
+        let metadata = options.metadata(1.0);
+        let tip = metadata.tip.radius_mm(metadata.kerf_mm);
+        Some(Rim {
+            cut: SmoothRim {
+                beyond: Arc::from(skirt.beyond.as_slice()),
+                margin_mm: metadata.neck_mm() + tip,
+            },
+            inner: Arc::clone(&skirt.inner),
+        })
+    }
+
     /// All surfaces that the pattern is to fit; `source` is that of the first.
     pub fn targets(&self, source: &Source) -> Targets {
         let first = Target::new(title(source), self.import.surface.clone());
@@ -146,17 +188,46 @@ fn read_also(request: &Request, first: &Import) -> Result<Vec<Also>, MakeError> 
     request.also.iter().enumerate().map(further).collect()
 }
 
+/// Continues the surface beyond its rims, where those are to be smooth.
+fn with_skirt(request: &Request, surface: &mut Surface) -> Result<Option<Skirt>, MakeError> {
+    let RimWish::Smooth { skirt_mm } = request.sheet.rim else {
+        return Ok(None);
+    };
+    if !request.also.is_empty() {
+        return Err(MakeError::RimOfSeveral);
+    }
+    let width_mm = skirt_mm.unwrap_or_else(|| {
+        SKIRT_IN_EDGES
+            * match request.sizing {
+                Sizing::EdgeMm(edge_mm) => MEAN_OPENING * edge_mm,
+                // Opened, so many triangles cover it.
+                Sizing::Triangles(count) => {
+                    (surface.area() / (0.75f64.sqrt() * 0.5 * count)).sqrt()
+                }
+            }
+    });
+    let wide = skirt(surface, width_mm).map_err(MakeError::Skirt)?;
+    let inner = std::mem::replace(surface, wide.surface);
+    Ok(Some(Skirt {
+        width_mm,
+        beyond: wide.beyond,
+        inner: Arc::new(inner),
+        bare_rims: wide.bare_rims,
+    }))
+}
+
 /// Reads the surface, checks its hash, and turns the cones asked for into vertices.
 pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
     let (mut import, sha256) = read(&request.source, &request.import)?;
     let mut also = read_also(request, &import)?;
+    let mut skirt = with_skirt(request, &mut import.surface)?;
     let before = (!also.is_empty()).then(|| import.surface.clone());
     let mut cones = None;
     let mut cone_choices = None;
     if let ConeWish::Given(wished) = &request.cones {
         let (mut list, mut choices) = (Vec::new(), Vec::new());
         for &(place, units) in wished {
-            let vertex = vertex_at("cone", place, &mut import.surface)?;
+            let vertex = vertex_at("cone", place, &mut import.surface, &mut skirt)?;
             list.push(Cone { vertex, units });
             let (number, at_mm) = match place {
                 ConePlace::Vertex(number) => (Some(number), None),
@@ -177,7 +248,7 @@ pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
         for places in wished {
             let stops = places
                 .iter()
-                .map(|&place| vertex_at("dart", place, &mut import.surface))
+                .map(|&place| vertex_at("dart", place, &mut import.surface, &mut skirt))
                 .collect::<Result<Vec<_>, _>>()?;
             let (vertices, points_mm) = written(places, &stops, &import.surface);
             list.push(Dart { stops });
@@ -216,6 +287,7 @@ pub(crate) fn load(request: &Request) -> Result<Loaded, MakeError> {
     }
     Ok(Loaded {
         import,
+        skirt,
         sha256,
         cones,
         cone_choices,
@@ -252,6 +324,7 @@ fn vertex_at(
     what: &'static str,
     place: ConePlace,
     surface: &mut Surface,
+    skirt: &mut Option<Skirt>,
 ) -> Result<VertexId, MakeError> {
     match place {
         ConePlace::Vertex(number) => numbered(what, number, surface),
@@ -259,6 +332,22 @@ fn vertex_at(
             let found = found_at(what, at, surface)?;
             let (changed, vertex) =
                 insert_point(surface, found.face, found.barycentric).map_err(MakeError::Edit)?;
+            if let Some(skirt) = skirt {
+                // A part of a split face has two of its corners, and is where it was.
+                let around = (0..3).filter_map(|k| surface.twin(HalfedgeId::side(found.face, k)));
+                let old: Vec<FaceId> = std::iter::once(found.face)
+                    .chain(around.map(HalfedgeId::face))
+                    .collect();
+                for new in surface.faces().len()..changed.faces().len() {
+                    let corners = changed.faces()[FaceId(new as u32)];
+                    let of = old.iter().find(|f| {
+                        let own = &surface.faces()[**f];
+                        corners.iter().filter(|c| own.contains(c)).count() == 2
+                    });
+                    let beyond = of.is_some_and(|f| skirt.beyond[f.index()]);
+                    skirt.beyond.push(beyond);
+                }
+            }
             *surface = changed;
             Ok(vertex)
         }

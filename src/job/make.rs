@@ -15,21 +15,22 @@ use super::design::{
     AlsoChoice, ConeChoice, DartChoice, Design, FORMAT, LinkageChoice, SheetChoice, SolveChoice,
     SurfaceChoice,
 };
-use super::load::{Also, Loaded, MOST_SURFACES, load};
+use super::load::{Also, Loaded, MOST_SURFACES, Skirt, load};
 use super::maps::cone_opening_mm;
 use super::report::{self, DrawnSheet, Page, Pose, Stroke};
 use super::request::{Request, Source};
 use super::several::choose_for_all;
-use super::shape::{Fit, Stock, on_shape};
+use super::shape::{Fit, Shape, Stock, on_shape};
 use super::verdict::{Reason, Verdict};
 use super::{MakeError, remedy, tell};
 use crate::base::atomic;
+use crate::base::ids::Id as _;
 use crate::base::progress::Progress;
 use crate::conformal::{Cone, Dart, Flattened, Layout, Sizing};
 use crate::linkage::{write_glb, write_obj};
 use crate::machine::Machine;
 use crate::material::{CutSetting, Material, TipShape};
-use crate::mesh::{PartChoice, Surface, write};
+use crate::mesh::{FaceId, PartChoice, Surface, distance_to_triangle, write};
 use crate::pattern::{self, HingeRisk, SheetOptions, Tip, hinge_risks};
 use crate::rationalize::{Quality, Solver, hinge_scales};
 use crate::toolpath::{Role, Toolpath};
@@ -169,10 +170,11 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     let material = crate::material::load(&request.material).map_err(MakeError::Material)?;
     let machine = crate::machine::load(&request.machine).map_err(MakeError::Machine)?;
     let setting = material.cut_for(&machine).map_err(MakeError::Cut)?;
-    let stock = stock(request, &material, &machine, &setting)?;
+    let mut stock = stock(request, &material, &machine, &setting)?;
 
     progress.start("reading the surface", None);
     let loaded = load(request)?;
+    stock.rim = loaded.rim(&stock.options);
     let surface = &loaded.import.surface;
     let targets = loaded.targets(&request.source);
     targets.check_sizes(stock.sigma)?;
@@ -297,11 +299,18 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     let html = report::html(&page);
     progress.check()?;
     let layout = |surface: &Surface| {
+        let (faces, chart): (Vec<_>, Vec<_>) = surface
+            .faces()
+            .iter_ids()
+            .zip(&shape.chart)
+            .filter(|((face, _), _)| reached(surface, *face, &loaded, &shape))
+            .map(|((_, corners), chart)| (*corners, *chart))
+            .unzip();
         let text = write::obj_text(
             "kagome layout: the surface in mm, vt = conformal layout on the sheet in mm",
             surface.positions(),
-            surface.faces(),
-            Some(&shape.chart),
+            &faces,
+            Some(&chart),
         );
         text.into_bytes()
     };
@@ -370,6 +379,7 @@ pub(crate) fn stock<'a>(
         machine,
         stock_mm: request.sheet.stock_mm,
         divide: request.sheet.divide,
+        rim: None,
         tabs: request.sheet.tabs,
         tab_width_mm: request.sheet.tab_width_mm,
     };
@@ -398,6 +408,23 @@ pub(crate) struct Taken<'a> {
     pub left_out: &'a [u32],
     pub orientation_deg: f64,
     pub shares: &'a [f64],
+}
+
+/// Whether a face is part of the surface, or, beyond its smooth rim, within a triangle's edge of a corner that is cut off.
+fn reached(surface: &Surface, face: FaceId, loaded: &Loaded, shape: &Shape) -> bool {
+    let beyond = |skirt: &Skirt| skirt.beyond.get(face.index()) == Some(&true);
+    if !loaded.skirt.as_ref().is_some_and(beyond) {
+        return true;
+    }
+    let corners = surface.corners(face);
+    let positions = &shape.first().positions;
+    shape.linkage.triangles.iter().any(|triangle| {
+        let Some(trim) = &triangle.trim else {
+            return false;
+        };
+        let at = positions.get(triangle.points[trim.beyond].index());
+        at.is_some_and(|p| distance_to_triangle(&corners, p) < shape.linkage.edge_mm)
+    })
 }
 
 /// Every decision, asked for or taken.
@@ -449,6 +476,7 @@ pub(crate) fn decided(
             mirror: request.mirror,
             stock_mm: stock.stock_mm,
             undivided: !stock.divide,
+            smooth_rim_skirt_mm: loaded.skirt.as_ref().map(|s| s.width_mm),
             tip: match stock.options.tip {
                 Tip::Plain => None,
                 Tip::Round { .. } => Some(TipShape::Round),

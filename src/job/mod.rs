@@ -38,7 +38,7 @@ pub use make::{FILES, Made, make};
 pub use map_figures::{ConeFigures, MapFigures};
 pub use request::{
     ACCEPT_DISTANCE, COOL_REACH_MM, ConePlace, ConeWish, DEFAULT_TRIANGLES, DartWish, FlapWish,
-    Request, SheetWish, Source, TAB_WIDTH_MM,
+    Request, RimWish, SheetWish, Source, TAB_WIDTH_MM,
 };
 pub use states::{Opening, StateFigures, StateFiles};
 pub use verdict::{COVERAGE_WANTED, EDGE_TOLERANCE, Reason, Verdict};
@@ -73,6 +73,16 @@ pub enum MakeError {
         /// The most.
         most: usize,
     },
+    /// A smooth rim for several surfaces.
+    #[error(
+        "a smooth rim goes with one surface only: leave --also away, or let the rim follow the triangles (--rim lattice)"
+    )]
+    RimOfSeveral,
+    /// The surface cannot be continued beyond its rims.
+    #[error(
+        "the surface cannot be continued beyond its rim for a smooth edge: {0}. Let the rim follow the triangles (--rim lattice), or mend the mesh there"
+    )]
+    Skirt(crate::mesh::TopologyError),
     /// The mesh file cannot be read.
     #[error("cannot read {path}: {source}")]
     Read {

@@ -9,7 +9,7 @@ use super::targets::Targets;
 use super::verdict::{Reason, place};
 use crate::base::progress::Progress;
 use crate::base::units::short;
-use crate::linkage::{Linkage, LinkageOptions, build_without, fit};
+use crate::linkage::{Linkage, LinkageOptions, Without, build_without, fit};
 use crate::mesh::{ClosestPoint, Surface};
 use crate::rationalize::{Bounds, Quality, Solver, rationalize};
 
@@ -182,8 +182,11 @@ impl Trial<'_> {
                 remove_at_cone: self.shape.removed,
                 sigma: self.stock.sigma,
             };
-            let guide = &self.shape.ground.guide;
-            build_without(surface, &fitted.layout, &lattice, &[], guide, self.progress)
+            let without = Without {
+                rim: self.stock.rim.as_ref().map(|r| &r.cut),
+                ..Without::nothing(&self.shape.ground.guide)
+            };
+            build_without(surface, &fitted.layout, &lattice, &without, self.progress)
         });
         // What cannot be laid out is no help, and no error here.
         let Ok(built) = built else {

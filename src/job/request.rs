@@ -63,6 +63,19 @@ pub enum FlapWish {
     None,
 }
 
+/// Where a sheet ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum RimWish {
+    /// Along edges of triangles that lie wholly on the surface.
+    #[default]
+    Lattice,
+    /// Along the surface's own rim, through the triangles that keep two hinges.
+    Smooth {
+        /// How far the surface is continued to lay those on, millimetres; `None`: a little more than a triangle.
+        skirt_mm: Option<f64>,
+    },
+}
+
 /// Shapes of what is cut, and the sheets that it is cut from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SheetWish {
@@ -70,6 +83,8 @@ pub struct SheetWish {
     pub stock_mm: Option<[f64; 2]>,
     /// Divide what does not fit into pieces with flaps.
     pub divide: bool,
+    /// Where it ends.
+    pub rim: RimWish,
     /// Shape of the slits' tips, in place of the material's.
     pub tip: Option<Tip>,
     /// Radius of the triangles' corners, millimetres, in place of the material's.
@@ -89,6 +104,7 @@ impl Default for SheetWish {
         Self {
             stock_mm: None,
             divide: true,
+            rim: RimWish::Lattice,
             tip: None,
             corner_radius_mm: None,
             alignment_hole_mm: 0.0,

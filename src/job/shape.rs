@@ -17,11 +17,21 @@ use super::verdict::{Verdict, place};
 use crate::base::progress::Progress;
 use crate::base::units::short;
 use crate::conformal::{FlattenOptions, Flattened, Layout, Sizing};
-use crate::linkage::{Built, Flaps, Linkage, LinkageOptions, TriangleId, build_without, fit};
+use crate::linkage::{
+    Built, Flaps, Linkage, LinkageOptions, SmoothRim, TriangleId, Without, build_without, fit,
+};
 use crate::machine::Machine;
 use crate::mesh::Surface;
 use crate::pattern::{Sheet, SheetOptions};
 use crate::rationalize::{Effort, Quality, STAGE_COUNT, failing, rationalize};
+
+/// A smooth rim.
+pub(crate) struct Rim {
+    /// Where it runs.
+    pub cut: SmoothRim,
+    /// The surface that ends there: what is to be covered.
+    pub inner: Arc<Surface>,
+}
 
 /// What the sheet is to be, whatever its shape.
 pub(crate) struct Stock<'a> {
@@ -35,6 +45,8 @@ pub(crate) struct Stock<'a> {
     pub stock_mm: Option<[f64; 2]>,
     /// Divide what does not fit.
     pub divide: bool,
+    /// Where the sheet is cut along the smooth rim of its surface; `None` for lattice edges.
+    pub rim: Option<Rim>,
     /// Tabs for each part.
     pub tabs: usize,
     /// Width of each, millimetres.
@@ -107,13 +119,13 @@ pub(crate) fn attempt(
     progress: &dyn Progress,
 ) -> Result<Shape, MakeError> {
     let mut left_out = request.left_out.clone().unwrap_or_default();
-    let mut laid = lay_out(request, &map, &left_out, stock.sigma, progress)?;
+    let mut laid = lay_out(request, &map, &left_out, stock, progress)?;
     if request.left_out.is_none() {
         let (layout, lattice) = (&laid.flat.layout, &laid.lattice);
         close_slots(
             &map,
-            layout,
-            lattice,
+            stock,
+            (layout, lattice),
             &mut laid.built,
             &mut left_out,
             progress,
@@ -142,11 +154,12 @@ pub(crate) fn attempt(
         }
         progress.note(&format!("left out: {} triangles", left_out.len()));
         let surface = &map.ground.surface;
-        let guide = &map.ground.guide;
-        let mut built = build_without(surface, &flat.layout, &lattice, &left_out, guide, progress)
-            .map_err(MakeError::Linkage)?;
         let layout = &flat.layout;
-        close_slots(&map, layout, &lattice, &mut built, &mut left_out, progress)?;
+        let without = without(&map, stock, &left_out);
+        let mut built = build_without(surface, layout, &lattice, &without, progress)
+            .map_err(MakeError::Linkage)?;
+        let laid_on = (layout, &lattice);
+        close_slots(&map, stock, laid_on, &mut built, &mut left_out, progress)?;
         let laid = Laid {
             flat: flat.clone(),
             built,
@@ -167,8 +180,8 @@ pub(crate) fn attempt(
 /// may run otherwise and leave a new one.
 fn close_slots(
     map: &Map,
-    layout: &Layout,
-    lattice: &LinkageOptions,
+    stock: &Stock<'_>,
+    (layout, lattice): (&Layout, &LinkageOptions),
     built: &mut Built,
     left_out: &mut Vec<u32>,
     progress: &dyn Progress,
@@ -184,11 +197,20 @@ fn close_slots(
         }
         left_out.extend(later);
         left_out.sort_unstable();
-        let (surface, guide) = (&map.ground.surface, &map.ground.guide);
-        *built = build_without(surface, layout, lattice, left_out, guide, progress)
+        let surface = &map.ground.surface;
+        let without = without(map, stock, left_out);
+        *built = build_without(surface, layout, lattice, &without, progress)
             .map_err(MakeError::Linkage)?;
     }
     Ok(())
+}
+
+fn without<'a>(map: &'a Map, stock: &'a Stock<'_>, triangles: &'a [u32]) -> Without<'a> {
+    Without {
+        triangles,
+        guide: &map.ground.guide,
+        rim: stock.rim.as_ref().map(|r| &r.cut),
+    }
 }
 
 /// Solves and judges a linkage, and draws its sheet.
@@ -254,7 +276,8 @@ fn solve(
         )
         .map_err(MakeError::Rationalize)?;
         let surface = shape.map_or(surface, |shape| &shape.surface);
-        let quality = Quality::measure(&linkage, &positions, surface, &target.closest, stock.sigma);
+        let wanted = stock.rim.as_ref().map_or(surface, |rim| &rim.inner);
+        let quality = Quality::measure(&linkage, &positions, wanted, &target.closest, stock.sigma);
         let judged = Verdict::judge(
             &quality,
             &flat,
@@ -346,7 +369,7 @@ pub(crate) fn lay_out(
     request: &Request,
     map: &Map,
     left_out: &[u32],
-    sigma: f64,
+    stock: &Stock<'_>,
     progress: &dyn Progress,
 ) -> Result<Laid, MakeError> {
     let surface = &map.ground.surface;
@@ -386,10 +409,10 @@ pub(crate) fn lay_out(
             orientation: fit.orientation_deg.to_radians(),
             handedness: request.handedness,
             remove_at_cone: map.removal,
-            sigma,
+            sigma: stock.sigma,
         };
-        let guide = &map.ground.guide;
-        let built = build_without(surface, &fit.layout, &lattice, left_out, guide, progress)
+        let without = without(map, stock, left_out);
+        let built = build_without(surface, &fit.layout, &lattice, &without, progress)
             .map_err(MakeError::Linkage)?;
         flat.layout = fit.layout;
         Ok(Laid {

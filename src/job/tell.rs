@@ -74,6 +74,14 @@ pub(crate) fn warnings(
             }
         ));
     }
+    if let Some(skirt) = &loaded.skirt {
+        warnings.extend(skirt.bare_rims.iter().map(|rim| {
+            format!(
+                "rim {} is too small to be cut smoothly at this triangle size: the sheet follows the triangles there",
+                rim + 1
+            )
+        }));
+    }
     if built.lost > 0 {
         warnings.push(format!(
             "at the rim {} hanging by fewer than two others left out",
@@ -227,11 +235,15 @@ pub(crate) fn summary(
         lines.push((
             "Pattern".to_owned(),
             format!(
-                "{} triangles{} of {} mm, {} slits, hinges {} mm wide, cut {} mm wide",
+                "{} triangles{}{} of {} mm, {} slits, hinges {} mm wide, cut {} mm wide",
                 figures.triangles,
                 match figures.flaps {
                     0 => String::new(),
                     n => format!(" and {n} flap triangles"),
+                },
+                match trimmed(shape) {
+                    0 => String::new(),
+                    n => format!(", {n} trimmed at the rim,"),
                 },
                 short(flat.edge_mm, 2),
                 figures.slits,
@@ -289,6 +301,12 @@ pub(crate) fn summary(
         ));
     }
     lines
+}
+
+/// Triangles of which a smooth rim cuts off a part.
+fn trimmed(shape: &Shape) -> usize {
+    let all = shape.linkage.triangles.iter();
+    all.filter(|t| t.trim.is_some()).count()
 }
 
 /// What the box around a sheet costs, if the material's profile has a price.
@@ -398,6 +416,7 @@ pub(crate) fn figures(
             "removed_at_cone": built.removed,
             "left_out_where_it_fails": shape.left_out.len(),
             "left_out_at_rim": built.lost,
+            "trimmed_at_rim": trimmed(shape),
             "seam_edges": built.seam_edges,
             "seam_edges_without_flaps": shape.flaps.bare_edges(),
             "seam_segments": shape.flaps.segments,

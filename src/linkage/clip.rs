@@ -1,12 +1,15 @@
 //! Lays the lattice on a layout and keeps what makes a linkage: triangles whose three corners lie on the surface, each
-//! held by at least two others (the 2-core of the adjacency), in one piece.
+//! held by at least two others (the 2-core of the adjacency), in one piece. At a smooth rim also triangles that it trims.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use nalgebra::Point2;
 
 use super::lattice::{Key, Lattice, across};
 use super::net::Net;
+use super::trim::{Fate, SmoothRim, Trim, fate, hinge_of_side};
+use super::types::Handedness;
 use super::walk::Walker;
 use super::{Colour, LinkageError};
 use crate::base::progress::Progress;
@@ -26,8 +29,20 @@ pub(crate) struct Laid {
     pub colour: Colour,
     /// Per side: the triangle across it and that triangle's side.
     pub neighbours: [Option<(usize, usize)>; 3],
+    /// Per side: whether the hinge to that triangle has its ligaments, which a smooth rim may cut off.
+    pub held: [bool; 3],
+    /// What a smooth rim leaves of it.
+    pub trim: Option<Arc<Trim>>,
     /// Its number among all that were laid.
     pub number: u32,
+}
+
+impl Laid {
+    /// The triangles that it is hinged to.
+    fn hinged(&self) -> impl Iterator<Item = usize> + '_ {
+        let sides = self.neighbours.iter().zip(&self.held);
+        sides.filter_map(|(n, held)| n.filter(|_| *held).map(|n| n.0))
+    }
 }
 
 /// Closer than this (in L) counts as the same place, or than a few times the seam's gap if that is more: a symmetric
@@ -44,12 +59,14 @@ pub(super) fn walker<'a>(surface: &'a Surface, layout: &'a Layout, edge_mm: f64)
     }
 }
 
-/// All lattice triangles with their three corners on the surface, with their neighbours, by face and key.
+/// All lattice triangles with their three corners on the surface, with their neighbours, by face and key. With a smooth
+/// rim only those of which it leaves enough.
 pub(crate) fn lay(
     surface: &Surface,
     layout: &Layout,
     lattice: &Lattice,
-    edge_mm: f64,
+    (edge_mm, handedness): (f64, Handedness),
+    rim: Option<&SmoothRim>,
     progress: &dyn Progress,
 ) -> Result<Vec<Laid>, LinkageError> {
     let walker = walker(surface, layout, edge_mm);
@@ -71,6 +88,11 @@ pub(crate) fn lay(
             .iter()
             .all(|&c| walker.walk(face, centroid, c).is_some())
         {
+            let trim = match rim.map(|rim| fate(&walker, rim, face, centroid, &corners)) {
+                Some(Fate::Gone) => continue,
+                Some(Fate::Trimmed(trim)) => Some(Arc::new(trim)),
+                Some(Fate::Whole) | None => None,
+            };
             number[n] = laid.len();
             keys.push(key);
             laid.push(Laid {
@@ -79,6 +101,8 @@ pub(crate) fn lay(
                 corners,
                 colour: key.colour,
                 neighbours: [None; 3],
+                held: [true; 3],
+                trim,
                 number: laid.len() as u32,
             });
         }
@@ -117,6 +141,22 @@ pub(crate) fn lay(
                 laid[n].neighbours[side] = None;
             }
         }
+    }
+    let has_room = |n: usize, side: usize| {
+        let trim = &laid[n].trim;
+        let hinge = hinge_of_side(handedness, laid[n].colour, side);
+        trim.as_ref().is_none_or(|t| t.beyond != hinge)
+    };
+    let held: Vec<[bool; 3]> = (0..laid.len())
+        .map(|n| {
+            std::array::from_fn(|side| {
+                let beyond = laid[n].neighbours[side];
+                has_room(n, side) && beyond.is_none_or(|(other, theirs)| has_room(other, theirs))
+            })
+        })
+        .collect();
+    for (triangle, held) in laid.iter_mut().zip(held) {
+        triangle.held = held;
     }
     Ok(laid)
 }
@@ -244,14 +284,8 @@ fn to_chart(
 pub(crate) fn core(laid: &[Laid], keep: impl Fn(usize) -> bool) -> (Vec<Laid>, usize) {
     let mut alive: Vec<bool> = (0..laid.len()).map(keep).collect();
     let asked = alive.iter().filter(|a| **a).count();
-    let degree_of = |alive: &[bool], n: usize| {
-        laid[n]
-            .neighbours
-            .iter()
-            .flatten()
-            .filter(|(other, _)| alive[*other])
-            .count()
-    };
+    let degree_of =
+        |alive: &[bool], n: usize| laid[n].hinged().filter(|other| alive[*other]).count();
     let mut queue: Vec<usize> = (0..laid.len())
         .filter(|&n| alive[n] && degree_of(&alive, n) < 2)
         .collect();
@@ -260,7 +294,7 @@ pub(crate) fn core(laid: &[Laid], keep: impl Fn(usize) -> bool) -> (Vec<Laid>, u
             continue;
         }
         alive[n] = false;
-        for &(other, _) in laid[n].neighbours.iter().flatten() {
+        for other in laid[n].hinged() {
             if alive[other] && degree_of(&alive, other) < 2 {
                 queue.push(other);
             }
@@ -278,7 +312,7 @@ pub(crate) fn core(laid: &[Laid], keep: impl Fn(usize) -> bool) -> (Vec<Laid>, u
         stack.push(seed);
         while let Some(n) = stack.pop() {
             count += 1;
-            for &(other, _) in laid[n].neighbours.iter().flatten() {
+            for other in laid[n].hinged() {
                 if alive[other] && piece[other] == usize::MAX {
                     piece[other] = seed;
                     stack.push(other);
@@ -365,6 +399,8 @@ mod tests {
                 corners: [Point2::origin(); 3],
                 colour: Colour::Up,
                 number: n as u32,
+                held: [true; 3],
+                trim: None,
                 neighbours: [
                     if n + 1 < count {
                         link(n + 1)

@@ -88,6 +88,7 @@ impl Flaps {
                 colour: triangle.colour,
                 flat: triangle.flat,
                 neighbours: beside.map(|n| n.map(|(t, side)| (t.index(), side))),
+                trim: triangle.trim.clone(),
             })
             .collect();
         let count = cells.len();
@@ -175,6 +176,7 @@ pub(super) fn rows(
                     .corners
                     .map(|(i, j)| lattice.point(f64::from(i), f64::from(j))),
                 neighbours,
+                trim: laid[tile.original].trim.clone(),
             },
             double: TriangleId::from_index(tile.original),
             segment,
@@ -476,7 +478,7 @@ impl<'a> Planner<'a> {
                 if !self.joined(tile, &other) {
                     return false;
                 }
-                hinges += 1;
+                hinges += usize::from(self.seams.net.held[3 * tile.original + k]);
             }
         }
         hinges >= 2 && tile.corners.iter().all(|&corner| self.fan(tile, corner))
@@ -681,6 +683,7 @@ pub(super) mod tests {
                 colour: l.colour,
                 flat: s.map(|(i, j)| lattice.point(f64::from(i), f64::from(j))),
                 neighbours: l.neighbours,
+                trim: None,
             })
             .collect()
     }

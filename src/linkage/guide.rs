@@ -172,7 +172,7 @@ impl SeamGuide {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use super::super::{Built, Handedness, LinkageOptions, build_without, fit};
+    use super::super::{Built, Handedness, LinkageOptions, Without, build_without, fit};
     use super::*;
     use crate::base::progress::Silent;
     use crate::conformal::{FlattenOptions, Flattened, MetricSolver, Singularities, Sizing};
@@ -223,7 +223,14 @@ pub(crate) mod tests {
     fn the_seam_of_a_vase_is_behind_it_from_wherever_one_looks() {
         let (surface, layout, lattice) = vase();
         let build = |guide: &SeamGuide| {
-            build_without(&surface, &layout, &lattice, &[], guide, &Silent).unwrap()
+            build_without(
+                &surface,
+                &layout,
+                &lattice,
+                &Without::nothing(guide),
+                &Silent,
+            )
+            .unwrap()
         };
         let shortest = build(&SeamGuide::facing(Vector3::zeros())).seam_edges;
         for deg in [10.0f64, 130.0, 250.0] {
@@ -257,7 +264,14 @@ pub(crate) mod tests {
             let guide = SeamGuide::facing(side)
                 .along(&surface, &[ends.to_vec()])
                 .unwrap();
-            let built = build_without(&surface, &layout, &lattice, &[], &guide, &Silent).unwrap();
+            let built = build_without(
+                &surface,
+                &layout,
+                &lattice,
+                &Without::nothing(&guide),
+                &Silent,
+            )
+            .unwrap();
             let seam = seam(&built);
             assert!(seam.len() > 10);
             for p in seam {
@@ -289,7 +303,14 @@ pub(crate) mod tests {
         };
         let path = vec![VertexId(0), surface.rims()[0][0]];
         let guide = SeamGuide::new(&surface).along(&surface, &[path]).unwrap();
-        let built = build_without(&surface, &flat.layout, &lattice, &[], &guide, &Silent).unwrap();
+        let built = build_without(
+            &surface,
+            &flat.layout,
+            &lattice,
+            &Without::nothing(&guide),
+            &Silent,
+        )
+        .unwrap();
         assert_eq!((built.seam_edges, built.pieces), (0, 1));
     }
 }

@@ -1,7 +1,8 @@
 //! Stage 3: the flat layout and a triangle lattice become a [`Linkage`]: rigid triangles joined in pairs.
 //!
 //! [`fit`] warps a [`Layout`] so that a lattice goes on across its seams, with a vertex on every cone. [`build`] lays
-//! the lattice of edge L on it, keeps the triangles that lie wholly on the surface and are held by at least two others,
+//! the lattice of edge L on it, keeps the triangles that lie wholly on the surface (or are trimmed by its smooth rim, [`Trim`])
+//! and are held by at least two others,
 //! cuts the seam along lattice lines, places every triangle flat and closed on the sheet, and lifts the linkage, opened
 //! as λ asks, back onto the surface. [`Flaps`] are the rows of triangles that are cut a second time along the seam, to be
 //! glued on.
@@ -23,6 +24,7 @@ mod pieces;
 mod read;
 mod seam;
 mod split;
+mod trim;
 mod types;
 mod walk;
 
@@ -38,6 +40,7 @@ pub use lattice::Lattice;
 pub use lift::opening_turn;
 pub use obj::write_obj;
 pub use read::{LinkageProblem, LinkageReadError, is_linkage, read_obj};
+pub use trim::{SmoothRim, Trim};
 pub use types::{Cell, Colour, Corner, Handedness, Hinge, Linkage, PointId, Triangle, TriangleId};
 
 use crate::base::progress::{Interrupted, Progress};
@@ -156,12 +159,39 @@ pub fn build(
     progress: &dyn Progress,
 ) -> Result<Built, LinkageError> {
     let guide = SeamGuide::new(surface);
-    build_without(surface, layout, options, &[], &guide, progress)
+    build_without(
+        surface,
+        layout,
+        options,
+        &Without::nothing(&guide),
+        progress,
+    )
 }
 
-/// Builds the linkage of a layout without some triangles, by their [`Built::numbers`]: openings where the sheet cannot
-/// follow. Numbers that are none are passed over. The seam runs where `guide` leads it, as far as the cones and rims that
-/// it must join leave it free.
+/// What a linkage is built without, and where it is cut.
+#[derive(Clone, Copy, Debug)]
+pub struct Without<'a> {
+    /// Triangles to leave out, by their [`Built::numbers`]: openings where the sheet cannot follow. Numbers that are none
+    /// are passed over.
+    pub triangles: &'a [u32],
+    /// Where the seam runs, as far as the cones and rims that it must join leave it free.
+    pub guide: &'a SeamGuide,
+    /// The smooth rim beyond which nothing is cut; `None` for one along lattice edges.
+    pub rim: Option<&'a SmoothRim>,
+}
+
+impl<'a> Without<'a> {
+    /// All triangles that lie wholly on the surface.
+    pub fn nothing(guide: &'a SeamGuide) -> Self {
+        Self {
+            triangles: &[],
+            guide,
+            rim: None,
+        }
+    }
+}
+
+/// Builds the linkage of a layout without some triangles.
 ///
 /// # Errors
 /// [`LinkageError`]: nothing fits, far too much fits, interruption.
@@ -169,10 +199,10 @@ pub fn build_without(
     surface: &Surface,
     layout: &Layout,
     options: &LinkageOptions,
-    left_out: &[u32],
-    guide: &SeamGuide,
+    without: &Without<'_>,
     progress: &dyn Progress,
 ) -> Result<Built, LinkageError> {
+    let guide = without.guide;
     let edge_mm = options.edge_mm;
     let (area, [width_mm, height_mm]) = (layout.area_mm2(), layout.extent_mm());
     let triangle_area = 0.5 * lattice::HEIGHT * edge_mm * edge_mm;
@@ -190,10 +220,11 @@ pub fn build_without(
         });
     }
     let lattice = Lattice::new(edge_mm, options.orientation);
-    let laid = clip::lay(surface, layout, &lattice, edge_mm, progress)?;
+    let size = (edge_mm, options.handedness);
+    let laid = clip::lay(surface, layout, &lattice, size, without.rim, progress)?;
     let mut dropped = clip::around_cones(&laid, options.remove_at_cone);
     let removed = dropped.iter().filter(|d| **d).count();
-    for &number in left_out {
+    for &number in without.triangles {
         if let Some(dropped) = dropped.get_mut(number as usize) {
             *dropped = true;
         }
@@ -212,6 +243,7 @@ pub fn build_without(
             colour: place.colour,
             flat: *corners,
             neighbours: place.neighbours,
+            trim: place.trim.clone(),
         })
         .collect();
     let linkage = Linkage::assemble(edge_mm, options.handedness, &cells);

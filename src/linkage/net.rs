@@ -50,6 +50,8 @@ pub(super) struct Net {
     pub rim: Vec<bool>,
     /// Whether unfolding around the node ends where it began.
     pub flat: Vec<bool>,
+    /// For each side whether the hinge over it has its ligaments; see [`Laid::held`].
+    pub held: Vec<bool>,
 }
 
 impl Net {
@@ -65,6 +67,7 @@ impl Net {
             leaving: Vec::new(),
             rim: Vec::new(),
             flat: Vec::new(),
+            held: laid.iter().flat_map(|l| l.held).collect(),
         };
         for side in 0..net.twin.len() {
             if net.twin[side].is_none() && net.node[side] == usize::MAX {

@@ -12,6 +12,7 @@ use nalgebra::{Point2, Vector2};
 use super::LinkageError;
 use super::clip;
 use super::lattice::{Key, Lattice};
+use super::types::Handedness;
 use crate::base::progress::Progress;
 use crate::conformal::Layout;
 use crate::mesh::{HalfedgeId, Surface};
@@ -70,7 +71,9 @@ pub(super) fn kept(
     edge_mm: f64,
     progress: &dyn Progress,
 ) -> Result<usize, LinkageError> {
-    let laid = clip::lay(surface, layout, lattice, edge_mm, progress)?;
+    // Neither the slits' direction nor a smooth rim changes which way suits the seams.
+    let size = (edge_mm, Handedness::Right);
+    let laid = clip::lay(surface, layout, lattice, size, None, progress)?;
     Ok(clip::core(&laid, |_| true).0.len())
 }
 

@@ -537,6 +537,8 @@ pub(super) mod tests {
             colour: Colour::Up,
             number: 0,
             neighbours,
+            held: [true; 3],
+            trim: None,
         }
     }
 

@@ -292,6 +292,7 @@ fn read(bytes: &[u8]) -> Result<(Linkage, Vec<Point3<f64>>), Located> {
             points: face.points.map(PointId::from_index),
             colour,
             flat,
+            trim: None,
         })
         .collect();
     let mut hinges = Vec::with_capacity(joints.len());

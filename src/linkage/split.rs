@@ -88,6 +88,7 @@ impl Built {
                 colour: laid.colour,
                 flat: spots.map(place),
                 neighbours: laid.neighbours,
+                trim: laid.trim.clone(),
             })
             .collect();
         let seam_edges = seam_edges(&net, &spots);
@@ -115,6 +116,7 @@ fn components(net: &Net, spots: &[[Spot; 3]], of: Vec<usize>) -> Vec<Vec<usize>>
             at += 1;
             for side in 3 * t..3 * t + 3 {
                 if let Some(twin) = net.twin[side]
+                    && net.held[side]
                     && joined(spots, side, twin)
                     && free.remove(&(twin / 3)).is_some()
                 {
@@ -217,9 +219,14 @@ mod tests {
     fn pieces_fit_lie_apart_and_the_linkage_in_space_stays_what_it_was() {
         let (surface, layout, lattice) = vase_with_lattice();
         let guide = crate::linkage::SeamGuide::facing(nalgebra::Vector3::z());
-        let built =
-            crate::linkage::build_without(&surface, &layout, &lattice, &[], &guide, &Silent)
-                .unwrap();
+        let built = crate::linkage::build_without(
+            &surface,
+            &layout,
+            &lattice,
+            &crate::linkage::Without::nothing(&guide),
+            &Silent,
+        )
+        .unwrap();
         let all: Vec<Point2<f64>> = built
             .linkage
             .triangles

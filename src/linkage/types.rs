@@ -5,8 +5,11 @@
 //! slits: triangles of one colour counter-clockwise, of the other clockwise (paper, §3 and Fig. 7). A lattice vertex
 //! therefore becomes several [`PointId`]s in space, each shared by exactly two triangles.
 
+use std::sync::Arc;
+
 use nalgebra::Point2;
 
+use super::trim::Trim;
 use crate::base::ids::{Id, Per, typed_id};
 
 typed_id!(
@@ -67,6 +70,8 @@ pub struct Triangle {
     pub colour: Colour,
     /// Its closed position on the sheet, millimetres, corner by corner.
     pub flat: [Point2<f64>; 3],
+    /// What a smooth rim leaves of it on the sheet; `None` for all of it. In space it stays whole.
+    pub trim: Option<Arc<Trim>>,
 }
 
 /// A corner (0, 1, 2) of a triangle.
@@ -119,6 +124,8 @@ pub struct Cell {
     pub flat: [Point2<f64>; 3],
     /// For each side `k` (corner `k` to `k + 1`): the neighbouring cell across it and that cell's side.
     pub neighbours: [Option<(usize, usize)>; 3],
+    /// What a smooth rim leaves of it; `None` for all.
+    pub trim: Option<Arc<Trim>>,
 }
 
 /// Rigid triangles and their hinges. Positions in space are kept apart, one per [`PointId`].
@@ -150,6 +157,7 @@ impl Linkage {
                 points: [UNSET; 3],
                 colour: c.colour,
                 flat: c.flat,
+                trim: c.trim.clone(),
             })
             .collect();
         let mut hinges = Vec::new();
@@ -244,6 +252,7 @@ impl Linkage {
                             find(i, j, Colour::Down, 2),
                             find(i - 1, j, Colour::Down, 0),
                         ],
+                        trim: None,
                     },
                     Colour::Down => Cell {
                         colour,
@@ -253,6 +262,7 @@ impl Linkage {
                             find(i, j + 1, Colour::Up, 0),
                             find(i, j, Colour::Up, 1),
                         ],
+                        trim: None,
                     },
                 }
             })
@@ -293,6 +303,14 @@ impl Linkage {
         } else {
             corner.corner
         }
+    }
+
+    /// Whether a smooth rim leaves a hinge its ligaments. Without them it is no hinge of the sheet, and its slit runs out.
+    pub fn keeps(&self, hinge: &Hinge) -> bool {
+        [hinge.ccw, hinge.cw].iter().all(|c| {
+            let trim = &self.triangles[c.triangle].trim;
+            trim.as_ref().is_none_or(|t| t.beyond != c.corner)
+        })
     }
 
     /// For every triangle and side: the triangle across it (and its side), whether on the sheet or across a seam.

@@ -4,6 +4,7 @@
 //! - [`repair`]: triangles into a surface: mended where that needs no guess, refused with place and remedy elsewhere;
 //! - [`samples`]: surfaces made here, by name;
 //! - [`closest`]: the closest point on a surface; [`edit`]: a point made a vertex, slits;
+//! - [`skirt`]: a strip beyond the rims, for patterns cut along a smooth one;
 //! - [`body`]: a solid body below a surface, to form over;
 //! - [`check`]: figures for people; [`mod@write`]: OBJ text.
 //!
@@ -24,6 +25,7 @@ pub mod error;
 pub mod read;
 pub mod repair;
 pub mod samples;
+pub mod skirt;
 mod surface;
 pub mod units;
 pub mod write;
@@ -34,5 +36,6 @@ pub use edit::{EditError, insert_point, slit};
 pub use error::{ImportError, Problem};
 pub use repair::{Import, ImportOptions, ImportReport, PartChoice, import_bytes, import_file};
 pub use samples::{Sample, SampleError};
+pub use skirt::{Skirted, skirt};
 pub use surface::{FaceId, HalfedgeId, Surface, TopologyError, VertexId};
 pub use units::{Unit, Units};

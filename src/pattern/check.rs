@@ -64,6 +64,31 @@ fn apart(s: [Point; 2], t: [Point; 2]) -> (f64, Point) {
 }
 
 impl Sheet {
+    /// Marks the slits that have no hinge: their tip lies on a contour, within half a kerf.
+    pub(super) fn find_through(&mut self) {
+        let near = 0.5 * self.metadata.kerf_mm;
+        let rim = RTree::bulk_load(self.edges());
+        for slit in &mut self.slits {
+            let at = around([slit.tip, slit.tip], near);
+            slit.through = rim.locate_in_envelope_intersecting(at).any(|edge| {
+                let [a, b] = ends(edge);
+                plane::from_segment(slit.tip, a, b) <= near
+            });
+        }
+    }
+
+    /// The contours' chords.
+    fn edges(&self) -> Vec<Indexed> {
+        let mut edges = Vec::new();
+        for contour in &self.contours {
+            let points = contour.line.flattened(CHORD_MM);
+            for (i, a) in points.iter().enumerate() {
+                edges.push(indexed(*a, points[(i + 1) % points.len()], i));
+            }
+        }
+        edges
+    }
+
     /// Checks that everything beside the slits is as wide as the hinges should be.
     ///
     /// # Errors
@@ -88,7 +113,7 @@ impl Sheet {
             .collect();
         let tree = RTree::bulk_load(slits);
         let room = meta.hinge_width_mm + 2.0 * tip.max(half);
-        for (n, slit) in self.slits.iter().enumerate() {
+        for (n, slit) in self.slits.iter().enumerate().filter(|(_, s)| !s.through) {
             let own = [slit.tail, slit.tip];
             for near in tree.locate_in_envelope_intersecting(around(own, room)) {
                 let m = near.data as usize;
@@ -102,7 +127,7 @@ impl Sheet {
                     slit.tip,
                 );
                 let tips = slit.tip.distance(other.tip) - 2.0 * tip;
-                if tips < least.0 {
+                if tips < least.0 && !other.through {
                     least.0 = tips;
                 }
                 if other.star != slit.star {
@@ -116,17 +141,10 @@ impl Sheet {
                 }
             }
         }
-        let mut edges = Vec::new();
-        for contour in &self.contours {
-            let points = contour.line.flattened(CHORD_MM);
-            for (i, a) in points.iter().enumerate() {
-                edges.push(indexed(*a, points[(i + 1) % points.len()], i));
-            }
-        }
-        let tree = RTree::bulk_load(edges);
+        let tree = RTree::bulk_load(self.edges());
         // A slit on the rim begins there; where corners are rounded, a little outside.
         let begin = 2.0 * (meta.kerf_mm + meta.corner_radius_mm);
-        for slit in &self.slits {
+        for slit in self.slits.iter().filter(|s| !s.through) {
             let own = [slit.tail, slit.tip];
             for near in tree.locate_in_envelope_intersecting(around(own, room)) {
                 let line = ends(near);
@@ -223,6 +241,7 @@ mod tests {
                     tip: middle + across,
                     star: u32::MAX,
                     flap: false,
+                    through: false,
                 });
                 assert_eq!(thin(&edited, middle), 0.0);
             }
@@ -242,6 +261,7 @@ mod tests {
             tip: middle + out * 3.0,
             star: 0,
             flap: false,
+            through: false,
         });
         let text = sheet.check_ligaments().unwrap_err().to_string();
         assert!(text.contains("the contour"), "{text}");

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use kurbo::Point;
+use kurbo::{Point, Vec2};
 
 use super::sheet::{Contour, PatternError};
 use crate::base::curve::{Curve, Piece};
-use crate::base::ids::{Id, Per};
-use crate::linkage::TriangleId;
+use crate::base::ids::Per;
+use crate::linkage::{Linkage, Triangle, TriangleId};
 
 /// Two flat corners closer than this (in L) are one point: lattice positions are exact to rounding.
 const SAME_POINT: f64 = 1e-6;
@@ -17,15 +17,36 @@ const SAME_POINT: f64 = 1e-6;
 /// At a pinch, where fans of triangles touch only in a point, the loop continues along the *same gap*, into the next
 /// fan: that keeps every loop simple, whereas a loop that stayed with its fan would run through the point twice.
 pub(super) fn trace(
-    triangles: &[[Point; 3]],
+    linkage: &Linkage,
     neighbours: &Per<TriangleId, [Option<(TriangleId, usize)>; 3]>,
-    edge_mm: f64,
 ) -> Result<Vec<Contour>, PatternError> {
+    let edge_mm = linkage.edge_mm;
     let mut sides: Vec<(Point, Point)> = Vec::new();
     for (t, across) in neighbours.iter_ids() {
-        for k in (0..3).filter(|k| across[*k].is_none()) {
-            let corners = &triangles[t.index()];
-            sides.push((corners[k], corners[(k + 1) % 3]));
+        let triangle = &linkage.triangles[t];
+        for (k, beyond) in across.iter().enumerate() {
+            let left = left_of(triangle, k);
+            // A neighbour has the same side the other way round; what both have is no edge.
+            let theirs = beyond.map(|(other, side)| {
+                let [from, to] = left_of(&linkage.triangles[other], side);
+                [1.0 - to, 1.0 - from]
+            });
+            let corners = [k, (k + 1) % 3].map(|c| corner(triangle, c));
+            for [from, to] in less(left, theirs) {
+                let at = |t: f64| match t {
+                    0.0 => corners[0],
+                    1.0 => corners[1],
+                    t => corners[0].lerp(corners[1], t),
+                };
+                sides.push((at(from), at(to)));
+            }
+        }
+        if let Some(trim) = &triangle.trim {
+            let at = |w: &[f64; 3]| {
+                let all = (0..3).map(|c| corner(triangle, c).to_vec2() * w[c]);
+                all.fold(Vec2::ZERO, |sum, p| sum + p).to_point()
+            };
+            sides.extend(trim.rim.windows(2).map(|w| (at(&w[0]), at(&w[1]))));
         }
     }
     let leaving = Leaving::new(&sides, edge_mm);
@@ -56,6 +77,26 @@ pub(super) fn trace(
         contours.push(Contour { line, outer });
     }
     Ok(contours)
+}
+
+fn corner(triangle: &Triangle, k: usize) -> Point {
+    Point::new(triangle.flat[k].x, triangle.flat[k].y)
+}
+
+/// What is left of a side.
+fn left_of(triangle: &Triangle, side: usize) -> [f64; 2] {
+    match &triangle.trim {
+        Some(trim) => trim.side(side),
+        None => [0.0, 1.0],
+    }
+}
+
+/// The parts of one interval that another one does not cover.
+fn less([from, to]: [f64; 2], other: Option<[f64; 2]>) -> impl Iterator<Item = [f64; 2]> {
+    let [low, high] = other.unwrap_or([to, to]);
+    [[from, to.min(low)], [from.max(high), to]]
+        .into_iter()
+        .filter(|[a, b]| b - a > SAME_POINT)
 }
 
 /// Boundary sides by the point where they start.

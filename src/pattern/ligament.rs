@@ -136,7 +136,7 @@ pub struct HingeRisk {
 }
 
 /// The risk at every hinge of an opened linkage, in their order. `openings` are λ by hinge, `positions` by point; hinges
-/// without either are left out.
+/// without either are left out, and so are those that a smooth rim cuts off.
 pub fn hinge_risks(
     linkage: &Linkage,
     positions: &[Point3<f64>],
@@ -156,6 +156,7 @@ pub fn hinge_risks(
         .iter()
         .zip(openings)
         .enumerate()
+        .filter(|(_, (hinge, _))| linkage.keeps(hinge))
         .filter_map(|(n, (hinge, &opening))| {
             let (u, v) = (normal(hinge.ccw.triangle)?, normal(hinge.cw.triangle)?);
             let fold = u.cross(&v).norm().atan2(u.dot(&v));

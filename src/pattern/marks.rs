@@ -152,7 +152,8 @@ impl<'a> Marker<'a> {
         let mut marker = Self {
             linkage,
             flat: linkage.flat_neighbours(),
-            used: vec![false; linkage.triangles.len()],
+            // Nothing is written on what a smooth rim trims.
+            used: linkage.triangles.iter().map(|t| t.trim.is_some()).collect(),
             holes: vec![0.0; linkage.triangles.len()],
             room_mm: linkage.edge_mm / 12f64.sqrt() - beside - 0.5 * meta.kerf_mm,
             corner_room_mm: linkage.edge_mm / 3f64.sqrt() - corner,

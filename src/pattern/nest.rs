@@ -37,6 +37,13 @@ pub struct Nested {
     pub motion: Motion,
 }
 
+/// Points of a triangle of which a smooth rim, which leaves two corners, leaves one.
+fn kept_points(triangle: &[Point; 3]) -> [Point; 4] {
+    let middle = plane::centroid(triangle);
+    let towards = |k: usize| middle.lerp(triangle[k], 0.5);
+    [middle, towards(0), towards(1), towards(2)]
+}
+
 impl Sheet {
     /// One sheet for each part, a rim with all that is inside it; and for each triangle the number of its part.
     pub fn parts(&self) -> (Vec<Sheet>, Vec<usize>) {
@@ -54,12 +61,14 @@ impl Sheet {
             })
             .collect();
         // The part of a point that lies inside one; on a rim the nearest.
-        let part_of = |p: Point| -> usize {
-            let hit = (0..outlines.len()).find(|n| {
+        let around = |p: Point| {
+            (0..outlines.len()).find(|n| {
                 let (bounds, points) = &outlines[*n];
                 bounds.contains(p) && plane::encloses(points, p)
-            });
-            hit.unwrap_or_else(|| {
+            })
+        };
+        let part_of = |p: Point| -> usize {
+            around(p).unwrap_or_else(|| {
                 let away = |n: &usize| {
                     let b = outlines[*n].0;
                     let q = Point::new(p.x.clamp(b.x0, b.x1), p.y.clamp(b.y0, b.y1));
@@ -69,6 +78,10 @@ impl Sheet {
                     .min_by(|a, b| away(a).total_cmp(&away(b)))
                     .unwrap_or(0)
             })
+        };
+        let part_of_triangle = |t: &[Point; 3]| {
+            let hit = kept_points(t).into_iter().find_map(around);
+            hit.unwrap_or_else(|| part_of(plane::centroid(t)))
         };
         let mut parts: Vec<Sheet> = rims
             .iter()
@@ -94,12 +107,12 @@ impl Sheet {
         }
         let mut numbers = Vec::with_capacity(self.triangles.len());
         for triangle in &self.triangles {
-            let part = part_of(plane::centroid(triangle));
+            let part = part_of_triangle(triangle);
             parts[part].triangles.push(*triangle);
             numbers.push(part);
         }
         for flap in &self.flaps {
-            parts[part_of(plane::centroid(flap))].flaps.push(*flap);
+            parts[part_of_triangle(flap)].flaps.push(*flap);
         }
         for mark in &self.marks {
             let at = mark.strokes().first().and_then(|l| l.start());

@@ -569,6 +569,7 @@ impl<'a> Reader<'a> {
                         tip,
                         star: 0,
                         flap: layer == Layer::Flaps,
+                        through: false,
                     };
                     let star = node.attribute("data-star").and_then(|s| s.parse().ok());
                     self.slits.push((slit, star));
@@ -638,6 +639,7 @@ impl<'a> Reader<'a> {
         }
         orient(&mut self.sheet.contours, &self.outer);
         self.sheet.slits = starred(self.slits);
+        self.sheet.find_through();
         Ok(Drawing {
             sheet: self.sheet,
             warnings: self.warnings,

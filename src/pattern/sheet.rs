@@ -2,6 +2,9 @@
 //!
 //! All widths are those of the finished part: the kerf and the shape of the slits' tips are taken off before, so that a
 //! ligament is what was asked for, whatever burns it.
+//!
+//! At a smooth rim triangles are trimmed ([`crate::linkage::Trim`]): a slit that begins beyond it begins at it, and one
+//! whose hinge it cut off runs out.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -27,17 +30,22 @@ pub const MAX_NECK: f64 = 0.5;
 /// Largest part of a slit that its widened end may take.
 const TIP_SHARE: f64 = 0.8;
 
+/// A slit shorter than this is none: the rim crosses its line in its end.
+const SAME_END_MM: f64 = 1e-6;
+
 /// One slit: an open cut on its centre line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slit {
-    /// The end at a lattice vertex, where up to three slits meet.
+    /// The end at a lattice vertex, where up to three slits meet, or where a smooth rim crosses it.
     pub tail: Point,
-    /// The end before the hinge.
+    /// The end before the hinge, or at the rim if it runs out there.
     pub tip: Point,
     /// The star: slits with the same number have one tail. Counted from 0 without gaps.
     pub star: u32,
     /// True if it runs along a flap triangle.
     pub flap: bool,
+    /// True if it has no hinge: it runs out at a smooth rim.
+    pub through: bool,
 }
 
 /// A closed edge of the finished part, material on the left.
@@ -477,7 +485,7 @@ impl Sheet {
             .collect();
         check_overlap(&triangles, linkage.edge_mm)?;
         let neighbours = whole.flat_neighbours();
-        let mut contours = contour::trace(&triangles, &neighbours, linkage.edge_mm)?;
+        let mut contours = contour::trace(&whole, &neighbours)?;
         for contour in &mut contours {
             contour.line = contour::rounded(&contour.line, metadata.corner_radius_mm);
         }
@@ -587,32 +595,55 @@ fn slits(
     flaps_from: usize,
 ) -> Vec<Slit> {
     let vertex = flat_vertices(&linkage.triangles, neighbours);
-    let mut found: Vec<(u32, bool, usize, Point, Point)> = Vec::with_capacity(linkage.hinges.len());
+    let mut found: Vec<(u32, usize, Slit)> = Vec::with_capacity(linkage.hinges.len());
+    // Slits that begin at the rim are stars of their own.
+    let mut own = 3 * linkage.triangles.len() as u32;
     for (order, hinge) in linkage.hinges.iter().enumerate().filter(|(_, h)| !h.seam) {
-        let flat = &linkage.triangles[hinge.ccw.triangle].flat;
+        let triangle = &linkage.triangles[hinge.ccw.triangle];
         let (from, to) = ((hinge.ccw.corner + 2) % 3, hinge.ccw.corner);
-        let (a, b) = (
-            Point::new(flat[from].x, flat[from].y),
-            Point::new(flat[to].x, flat[to].y),
-        );
-        let tip = b + (a - b).normalize() * neck_mm;
-        let star = vertex[hinge.ccw.triangle.index() * 3 + from];
+        let [a, b] = [from, to].map(|k| Point::new(triangle.flat[k].x, triangle.flat[k].y));
+        let through = !linkage.keeps(hinge);
+        // The side runs from `from` to `to`.
+        let left = match &triangle.trim {
+            Some(trim) => trim.side(from),
+            None => [0.0, 1.0],
+        };
+        let tail = if left[0] > 0.0 { a.lerp(b, left[0]) } else { a };
+        let tip = if through {
+            a.lerp(b, left[1])
+        } else {
+            b + (a - b).normalize() * neck_mm
+        };
+        if tail.distance(tip) <= SAME_END_MM {
+            continue;
+        }
+        let star = if left[0] > 0.0 {
+            own += 1;
+            own
+        } else {
+            vertex[hinge.ccw.triangle.index() * 3 + from]
+        };
         let flap = [hinge.ccw, hinge.cw]
             .iter()
             .any(|c| c.triangle.index() >= flaps_from);
-        found.push((star, flap, order, a, tip));
+        let slit = Slit {
+            tail,
+            tip,
+            star: 0,
+            flap,
+            through,
+        };
+        found.push((star, order, slit));
     }
-    found.sort_by_key(|&(star, flap, order, ..)| (star, flap, order));
+    found.sort_by_key(|&(star, order, slit)| (star, slit.flap, order));
     let mut numbers = BTreeMap::new();
     found
         .into_iter()
-        .map(|(root, flap, _, tail, tip)| {
+        .map(|(root, _, slit)| {
             let next = numbers.len() as u32;
             Slit {
-                tail,
-                tip,
                 star: *numbers.entry(root).or_insert(next),
-                flap,
+                ..slit
             }
         })
         .collect()

@@ -145,7 +145,7 @@ fn arm(slit: &Slit, d: Vec2, root_mm: f64, metadata: &SheetMetadata) -> Arm {
     let radius = metadata.tip.radius_mm(metadata.kerf_mm);
     // The middle of the beam goes around half a kerf inside the finished edge.
     let around = radius - half;
-    let (back, tip) = if around <= 0.0 || metadata.tip == Tip::Plain {
+    let (back, tip) = if around <= 0.0 || metadata.tip == Tip::Plain || slit.through {
         (0.0, None)
     } else {
         let back = base_mm(metadata.tip, around).min(0.9 * whole);

@@ -140,7 +140,9 @@ pub fn tips(drawing: &Drawing, burnt: &[[P; 2]], pixel: f64) -> Vec<Tip> {
         near.dedup();
         let length = (tip[0] - slit[0][0]).hypot(tip[1] - slit[0][1]);
         let d = [0, 1].map(|c| (tip[c] - slit[0][c]) / length);
-        let vertex = [0, 1].map(|c| slit[0][c] + drawing.edge * d[c]);
+        // At a smooth rim a slit may begin on its way: the vertex is told from its tip.
+        let neck = (drawing.hinge + 0.5 * drawing.kerf + end) / 0.75f64.sqrt();
+        let vertex = [0, 1].map(|c| tip[c] + neck * d[c]);
         let at_rim = drawing.corner_radius + 0.01 * drawing.edge;
         let near: Vec<&[P; 2]> = near.iter().map(|&n| &burnt[n]).collect();
         Tip {
@@ -149,8 +151,19 @@ pub fn tips(drawing: &Drawing, burnt: &[[P; 2]], pixel: f64) -> Vec<Tip> {
             rim: rims.iter().any(|s| distance(vertex, s) < at_rim),
         }
     };
+    // A slit that ends on the rim has no ligament.
+    let runs_out = |slit: &[P; 2]| {
+        rims.iter()
+            .any(|s| distance(slit[1], s) < 0.5 * drawing.kerf)
+    };
+    let slits: Vec<[P; 2]> = drawing
+        .slits
+        .iter()
+        .filter(|s| !runs_out(s))
+        .copied()
+        .collect();
     // Two halves at once: the slow check has thousands of windows.
-    let (a, b) = drawing.slits.split_at(drawing.slits.len() / 2);
+    let (a, b) = slits.split_at(slits.len() / 2);
     std::thread::scope(|scope| {
         let other = scope.spawn(|| b.iter().map(one).collect::<Vec<_>>());
         let mut all: Vec<Tip> = a.iter().map(one).collect();
