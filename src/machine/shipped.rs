@@ -236,6 +236,48 @@ mod tests {
             ),
             (
                 "plasma-qtplasmac",
+                "below_mm = 32",
+                "below_mm = 0",
+                "plasma.small_hole.below_mm",
+            ),
+            (
+                "plasma-qtplasmac",
+                "32, percent = 60",
+                "32, percent = 101",
+                "plasma.small_hole.percent",
+            ),
+            (
+                "plasma-qtplasmac",
+                "overcut_mm = 4",
+                "overcut_mm = 0",
+                "plasma.small_hole.overcut_mm",
+            ),
+            (
+                "plasma-qtplasmac",
+                "scribe = true\n",
+                "material_numbers = { \"steel-1.5\" = 1000000 }\n",
+                "plasma.material_numbers.steel-1.5",
+            ),
+            (
+                "plasma-qtplasmac",
+                "scribe = true\n",
+                "material_numbers = { \"Steel 1.5\" = 3 }\n",
+                "plasma.material_numbers.Steel 1.5",
+            ),
+            (
+                "plasma-linuxcnc",
+                "max_amps",
+                "small_hole = { below_mm = 32, percent = 60, overcut_mm = 4 }\nmax_amps",
+                "plasma.small_hole",
+            ),
+            (
+                "plasma-linuxcnc",
+                "max_amps",
+                "material_numbers = { \"steel-1.5\" = 3 }\nmax_amps",
+                "plasma.material_numbers",
+            ),
+            (
+                "plasma-qtplasmac",
                 "[homing]",
                 "[connection]\nbaud = 9600\nreceive_buffer_bytes = 300\nplanner_blocks = 9\nreset_on_open = false\n[homing]",
                 "connection",
