@@ -16,7 +16,7 @@ use crate::material::{self, Material};
 /// Options of `kagome machines`.
 #[derive(Args, Clone, Debug)]
 #[command(
-    after_help = "Examples:\n  kagome machines list --material leather-1.6\n  kagome machines new mine --from diode-400 --settings dollar.txt\n  kagome machines check mine.toml\n  kagome make scan.obj --machine mine.toml"
+    after_help = "Examples:\n  kagome machines list --material leather-1.6\n  kagome machines new mine --from diode-400 --settings dollar.txt --own\n  kagome machines check mine\n  kagome make scan.obj --machine mine"
 )]
 pub struct MachinesArgs {
     #[command(subcommand)]

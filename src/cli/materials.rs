@@ -15,7 +15,7 @@ use crate::material::{self, CutEntry, Material, Process};
 /// Options of `kagome materials`.
 #[derive(Args, Clone, Debug)]
 #[command(
-    after_help = "Examples:\n  kagome materials list --machine diode-400\n  kagome materials new mine --from leather-1.6\n  kagome materials check mine.toml\n  kagome make scan.obj --material mine.toml"
+    after_help = "Examples:\n  kagome materials list --machine diode-400\n  kagome materials new mine --from leather-1.6 --own\n  kagome materials check mine\n  kagome make scan.obj --material mine"
 )]
 pub struct MaterialsArgs {
     #[command(subcommand)]
