@@ -557,6 +557,7 @@ mod pty {
                 false
             });
             let child = Command::new(env!("CARGO_BIN_EXE_kagome"))
+                .env("KAGOME_PROFILES", "")
                 .args(["send", "--port", &path])
                 .arg(&file)
                 .stderr(Stdio::piped())

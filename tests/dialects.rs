@@ -14,13 +14,14 @@
 use std::process::Command;
 use std::sync::{Mutex, PoisonError};
 
+use kagome::base::curve::Curve;
 use kagome::base::progress::Silent;
 use kagome::control::JobRules;
 use kagome::gcode::{Beam, Dialect, read_as, verify, write};
 use kagome::linkage::{Handedness, Linkage};
 use kagome::machine::{self, Machine};
 use kagome::material::{self, Fit, Material};
-use kagome::pattern::{Sheet, SheetOptions, Tip, placed};
+use kagome::pattern::{Contour, Sheet, SheetOptions, Tip, placed};
 use kagome::sim::{Settings, rehearse};
 use kagome::toolpath::{CutOptions, plan};
 
@@ -38,7 +39,16 @@ fn job(machine: &Machine, material: &Material, shaped: bool) -> (Sheet, String) 
         corner_radius_mm: 0.02 * edge_mm,
         ..plain
     };
-    let sheet = Sheet::new(&linkage, if shaped { &round } else { &plain }).unwrap();
+    let mut sheet = Sheet::new(&linkage, if shaped { &round } else { &plain }).unwrap();
+    if shaped {
+        // A small hole.
+        let [a, b, c] = sheet.triangles[0];
+        let middle = a + ((b - a) + (c - a)) / 3.0;
+        sheet.contours.push(Contour {
+            line: Curve::circle(middle, 0.1 * edge_mm, false),
+            outer: false,
+        });
+    }
     let (sheet, _) = placed(&sheet, machine, false).unwrap();
     let options = CutOptions::of(&setting, machine, None);
     let path = plan(&sheet, &options, machine.park_mm()).unwrap();
@@ -47,10 +57,12 @@ fn job(machine: &Machine, material: &Material, shaped: bool) -> (Sheet, String) 
 }
 
 /// What `rs274` does not know, said in words that it does, and nothing that moves the head changed. GRBL's M4 is a
-/// spindle to it; G31 is other controllers' probe; the feed of a material and its height control are QtPlasmaC's.
+/// spindle to it; G31 is other controllers' probe; M190, which chooses a material, is a script of QtPlasmaC's and left
+/// out; the feed of a material is a number.
 fn for_rs274(text: &str, machine: &Machine, feed: f64) -> String {
     let mut lines: Vec<String> = text
         .lines()
+        .filter(|line| !line.starts_with("M190 "))
         .map(|line| {
             line.replace("F#<_hal[plasmac.cut-feed-rate]>", &format!("F{feed}"))
                 .replace("G31 ", "G38.2 ")
@@ -168,12 +180,19 @@ fn what_fits_makes_a_verified_job_and_what_does_not_is_refused() {
 #[ignore = "needs LinuxCNC: .ci/run installs it"]
 fn every_dialect_is_accepted_by_rs274_and_ends_where_our_reader_says() {
     let mut dialects = Vec::new();
-    for (name, _) in machine::shipped() {
-        let machine = machine::load(name).unwrap();
+    // QtPlasmaC once more with a material of the table's own list.
+    let all = machine::shipped().map(|(name, _)| (name, false));
+    for (name, listed) in all.chain([("plasma-qtplasmac", true)]) {
+        let mut machine = machine::load(name).unwrap();
         let material = material::shipped()
             .map(|(m, _)| material::load(m).unwrap())
             .find(|m| m.cut_for(&machine).is_ok())
             .unwrap();
+        if listed {
+            let numbers = &mut machine.plasma.as_mut().unwrap().material_numbers;
+            numbers.insert(material.name.clone(), 3);
+            machine.validate().unwrap();
+        }
         let feed = material.cut_for(&machine).unwrap().speed_mm_per_min;
         let (_, text) = job(&machine, &material, true);
         let theirs = sideways(canonical(&for_rs274(&text, &machine, feed)));
@@ -199,6 +218,9 @@ fn every_dialect_is_accepted_by_rs274_and_ends_where_our_reader_says() {
             text.contains("\nG3 ") || text.contains("\nG2 "),
             "{name} has arcs"
         );
+        let qtplasmac = Dialect::of(&machine) == Dialect::QtPlasmaC;
+        assert_eq!(text.contains("\nM62 P3\n"), qtplasmac, "{name}");
+        assert_eq!(text.contains("\nM190 P3\nM66 P3 L3 Q1\n"), listed, "{name}");
         dialects.push(Dialect::of(&machine));
     }
     for dialect in [

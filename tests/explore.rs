@@ -13,6 +13,7 @@ use serde_json::Value;
 
 fn kagome(args: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_kagome"))
+        .env("KAGOME_PROFILES", "")
         .args(args)
         .current_dir(folder)
         .output()

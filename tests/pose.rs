@@ -50,6 +50,7 @@ fn dome(folder: &Path) {
 fn pose(folder: &Path, handles: &str) -> Output {
     std::fs::write(folder.join("handles.toml"), handles).unwrap();
     Command::new(env!("CARGO_BIN_EXE_kagome"))
+        .env("KAGOME_PROFILES", "")
         .args(["pose", "linkage.obj", "--handles", "handles.toml", "-q"])
         .current_dir(folder)
         .output()

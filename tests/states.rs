@@ -247,6 +247,7 @@ fn what_cannot_be_asked_for_is_refused() {
 
 fn kagome(args: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_kagome"))
+        .env("KAGOME_PROFILES", "")
         .args(args)
         .current_dir(folder)
         .output()

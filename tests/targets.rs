@@ -45,6 +45,7 @@ impl Bench {
         let program =
             std::env::var("KAGOME_BIN").unwrap_or_else(|_| env!("CARGO_BIN_EXE_kagome").into());
         Command::new(program)
+            .env("KAGOME_PROFILES", "")
             .args(args)
             .current_dir(self.path())
             .output()

@@ -1,6 +1,6 @@
 //! What every room stands on, and nothing that belongs to one of them.
 //!
-//! - [`catalog`]: shipped profiles and profiles from files, by one name;
+//! - [`catalog`]: shipped profiles, those of a person's own folder and those from files, by one name;
 //! - [`curve`]: lines of straight pieces and arcs;
 //! - [`ids`]: typed indices and the per-element containers that only they open;
 //! - [`plane`]: points, segments and polygons;

@@ -12,7 +12,7 @@ pub enum StartError {
     Name(String),
     /// The name of a shipped profile.
     #[error(
-        "`{name}` is the name of a shipped {kind}, which would always be found first: choose another name"
+        "`{name}` is the name of a shipped {kind}, and one of the two would be hidden: choose another name"
     )]
     Taken {
         /// What kind of profile.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::profiles::{machine_named, material_named};
 use super::{Failure, Global, Terminal, print};
 use crate::base::atomic::write_file;
 use crate::base::units::short;
@@ -66,7 +67,9 @@ pub fn run(args: &CutArgs, global: &Global, terminal: &Terminal) -> Result<(), F
     }
     let text = std::fs::read_to_string(&args.drawing)
         .map_err(|e| Failure::Bad(format!("{} cannot be read: {e}", args.drawing.display())))?;
-    let result = cut_drawing(&text, &args.machine, &args.material, args.place, terminal);
+    let machine = machine_named(&args.machine).map_err(Failure::bad)?;
+    let material = material_named(&args.material).map_err(Failure::bad)?;
+    let result = cut_drawing(&text, &machine, &material, args.place, terminal);
     let made = result.map_err(|error| match error {
         MakeError::Drawing(e) => Failure::Bad(format!("{}: {e}", args.drawing.display())),
         other => Failure::bad(other),

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::layout_args::{LayoutArgs, SizeArgs};
+use super::profiles::{machine_named, material_named};
 use super::surface_args::SurfaceArgs;
 use super::{Failure, Global, Terminal, print};
 use crate::base::atomic::write_file;
@@ -48,8 +49,8 @@ pub fn run(args: &FlattenArgs, global: &Global, terminal: &Terminal) -> Result<(
     let form = args.output.as_deref().map(form_of).transpose()?;
     let request = Request {
         import: args.surface.options(),
-        material: args.size.material.clone(),
-        machine: args.machine.clone(),
+        material: material_named(&args.size.material).map_err(Failure::bad)?,
+        machine: machine_named(&args.machine).map_err(Failure::bad)?,
         sigma: args.size.sigma,
         sizing: args.size.sizing(),
         cones: args.layout.cones()?,

@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::flatten::{form_of, one_line, write};
 use super::layout_args::SizeArgs;
+use super::profiles::material_named;
 use super::surface_args::SurfaceArgs;
 use super::{Failure, Global, Terminal, inspect_linkage, print};
 use crate::job::{MapFigures, Request, explore};
@@ -93,7 +94,7 @@ pub fn run(args: &InspectArgs, global: &Global, terminal: &Terminal) -> Result<(
     if args.propose {
         let request = Request {
             import: args.surface.options(),
-            material: args.size.material.clone(),
+            material: material_named(&args.size.material).map_err(Failure::bad)?,
             sigma: args.size.sigma,
             sizing: args.size.sizing(),
             ..Request::new(args.surface.source())

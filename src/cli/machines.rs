@@ -4,17 +4,19 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::profiles::{checked, fit, write_new};
+use super::profiles::{
+    Listed, Place, checked, fit, listed, machine_named, material_named, own_folder, show, write_new,
+};
 use super::{Failure, Global, Terminal, print, print_json};
 use crate::base::progress::Progress as _;
 use crate::base::units::short;
 use crate::machine::{self, ControllerSettings, HeightControl, Machine, Tool};
-use crate::material;
+use crate::material::{self, Material};
 
 /// Options of `kagome machines`.
 #[derive(Args, Clone, Debug)]
 #[command(
-    after_help = "Examples:\n  kagome machines list --material leather-1.6\n  kagome machines new mine --from diode-400 --settings dollar.txt\n  kagome machines check mine.toml\n  kagome make scan.obj --machine mine.toml"
+    after_help = "Examples:\n  kagome machines list --material leather-1.6\n  kagome machines new mine --from diode-400 --settings dollar.txt --own\n  kagome machines check mine\n  kagome make scan.obj --machine mine"
 )]
 pub struct MachinesArgs {
     #[command(subcommand)]
@@ -31,12 +33,13 @@ enum What {
     },
     /// The profile of one
     Show {
-        /// A shipped name or a TOML file
+        /// The name of a shipped one or one of your own, or a TOML file
         name: String,
     },
     /// Whether a profile of your own is right
     Check {
-        /// A TOML file
+        /// A TOML file, or the name of one in your own folder
+        #[arg(value_name = "NAME|FILE")]
         file: String,
     },
     /// A profile of your own to start from, with an explanation of every key
@@ -52,6 +55,9 @@ enum What {
         /// The file to write [default: NAME.toml]
         #[arg(short, long, value_name = "FILE.toml")]
         output: Option<PathBuf>,
+        /// Write it into your own folder, where it is found by its name
+        #[arg(long, conflicts_with = "output")]
+        own: bool,
         /// Replace the file if it exists
         #[arg(long)]
         force: bool,
@@ -66,17 +72,20 @@ pub fn run(args: &MachinesArgs, global: &Global, terminal: &Terminal) -> Result<
     match &args.what {
         What::List { material } => list(material.as_deref(), global),
         What::Show { name } => {
-            let machine = machine::load(name).map_err(Failure::bad)?;
-            if global.json {
-                return print_json(&machine);
-            }
-            match machine::shipped().find(|(n, _)| n == name) {
-                Some((_, text)) => print(text.trim_end()),
-                None => print(&summary(&machine)),
-            }
+            let found = machine_named(name).map_err(Failure::bad)?;
+            let machine = machine::load(&found).map_err(Failure::bad)?;
+            let shipped = machine::shipped().find(|(n, _)| n == name);
+            show(
+                &machine,
+                name,
+                &found,
+                shipped.map(|(_, text)| text),
+                summary,
+                global,
+            )
         }
         What::Check { file } => {
-            let machine = checked(machine::load(file))?;
+            let machine = checked(machine_named(file).and_then(|found| machine::load(&found)))?;
             if global.json {
                 return print_json(&machine);
             }
@@ -87,6 +96,7 @@ pub fn run(args: &MachinesArgs, global: &Global, terminal: &Terminal) -> Result<
             from,
             settings,
             output,
+            own,
             force,
         } => {
             let settings = match settings {
@@ -101,7 +111,12 @@ pub fn run(args: &MachinesArgs, global: &Global, terminal: &Terminal) -> Result<
                 }
             };
             let text = machine::start(name, from, settings.as_ref()).map_err(Failure::bad)?;
-            write_new(&text, name, output.as_deref(), *force, global, terminal)?;
+            let place = if *own {
+                Place::Own(machine::own_file)
+            } else {
+                Place::File(output.as_deref())
+            };
+            write_new(&text, name, "--machine", &place, *force, global, terminal)?;
             for warning in settings.iter().flat_map(ControllerSettings::warnings) {
                 terminal.note(&format!("warning: {warning}"));
             }
@@ -111,31 +126,51 @@ pub fn run(args: &MachinesArgs, global: &Global, terminal: &Terminal) -> Result<
 }
 
 fn list(material: Option<&str>, global: &Global) -> Result<(), Failure> {
-    let mut all = Vec::new();
-    for (name, _) in machine::shipped() {
-        all.push(machine::load(name).map_err(Failure::bad)?);
-    }
-    let Some(material) = material else {
-        if global.json {
-            return print_json(&all);
+    let own = own_folder();
+    let all = listed(
+        machine::shipped().map(|(name, _)| name),
+        match &own {
+            Some(own) => machine::own_files(own).map_err(Failure::bad)?,
+            None => Vec::new(),
+        },
+        |name| machine::load(&machine::resolve(name, own.as_deref())?),
+        machine::load,
+    )?;
+    let material = match material {
+        None => None,
+        Some(material) => {
+            let found = material_named(material).map_err(Failure::bad)?;
+            Some(material::load(&found).map_err(Failure::bad)?)
         }
-        for m in &all {
-            print(&format!("{:<20} {}{}", m.name, m.title, default_mark(m)))?;
-        }
-        return Ok(());
     };
-    let material = material::load(material).map_err(Failure::bad)?;
     if global.json {
-        let rows: Vec<_> = all
+        let rows: Result<Vec<_>, Failure> = all
             .iter()
-            .map(|m| serde_json::json!({ "machine": m, "material": material.name, "answer": fit(m, &material).1 }))
+            .map(|row| value(row, material.as_ref()))
             .collect();
-        return print_json(&rows);
+        return print_json(&rows?);
     }
-    for m in &all {
-        print(&format!("{:<20} {}", m.name, fit(m, &material).0))?;
+    for row in &all {
+        let words = match (&row.profile, &material) {
+            (Err(wrong), _) => format!("is not usable: {wrong}"),
+            (Ok(machine), Some(material)) => fit(machine, material).0,
+            (Ok(machine), None) => format!("{}{}", machine.title, default_mark(machine)),
+        };
+        print(&format!("{:<20} {:<7} {words}", row.name, row.from()))?;
     }
     Ok(())
+}
+
+/// A row of the list for machines.
+fn value(row: &Listed<Machine>, material: Option<&Material>) -> Result<serde_json::Value, Failure> {
+    let Some(material) = material else {
+        return row.value();
+    };
+    let answer = match &row.profile {
+        Ok(machine) => fit(machine, material).1,
+        Err(wrong) => serde_json::json!({ "fit": "unknown", "why": wrong }),
+    };
+    Ok(serde_json::json!({ "machine": row.value()?, "material": material.name, "answer": answer }))
 }
 
 fn default_mark(machine: &Machine) -> &'static str {

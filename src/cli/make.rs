@@ -5,13 +5,16 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::layout_args::{CutArg, LayoutArgs, SizeArgs};
+use super::profiles::{machine_named, material_named};
 use super::sheet_args::SheetArgs;
 use super::surface_args::{SurfaceArgs, source};
 use super::{Failure, Global, Terminal, print, print_json};
 use crate::base::atomic::check_directory;
+use crate::base::progress::Progress as _;
 use crate::job::{ACCEPT_DISTANCE, Design, FILES, FlapWish, Made, MakeError, Request, make};
 use crate::linkage::Handedness;
 use crate::rationalize::Solver;
+use crate::{machine, material};
 
 /// Arguments of `kagome make`.
 #[derive(Args, Clone, Debug)]
@@ -162,6 +165,12 @@ pub fn run(args: &MakeArgs, global: &Global, terminal: &Terminal) -> Result<(), 
         print_json(&made.figures)?;
     } else if !global.quiet {
         print(&text(&made, &folder))?;
+        if made.verdict.pass && lacks_price(&request.material) {
+            terminal.note(&format!(
+                "with price_per_m2 and currency in {} the report would say what the sheet costs",
+                request.material
+            ));
+        }
     }
     if made.verdict.pass {
         Ok(())
@@ -177,6 +186,12 @@ pub fn run(args: &MakeArgs, global: &Global, terminal: &Terminal) -> Result<(), 
                 .join("\n  - ")
         )))
     }
+}
+
+/// Whether a material is the maker's own, and has no price: a shipped one is the same for all, and can have none.
+fn lacks_price(name: &str) -> bool {
+    let shipped = material::shipped().any(|(shipped, _)| shipped == name);
+    !shipped && material::load(name).is_ok_and(|m| m.price_per_m2.is_none())
 }
 
 /// Options that a design file decides for itself.
@@ -222,6 +237,13 @@ fn from_design(args: &MakeArgs) -> Result<Request, Failure> {
         .map_err(|e| Failure::Bad(format!("cannot read {}: {e}", path.display())))?;
     let design = Design::parse(&args.surface.surface, &text).map_err(Failure::bad)?;
     let mut request = design.request(path.parent().unwrap_or(Path::new("")));
+    // Own profiles are noted down by their files: a shipped name in a design is the shipped one, whatever hides it here.
+    if !material::shipped().any(|(name, _)| name == request.material) {
+        request.material = material_named(&request.material).map_err(Failure::bad)?;
+    }
+    if !machine::shipped().any(|(name, _)| name == request.machine) {
+        request.machine = machine_named(&request.machine).map_err(Failure::bad)?;
+    }
     if let Some(distance) = args.accept_distance {
         request.accept_distance = distance;
     }
@@ -234,8 +256,8 @@ fn from_arguments(args: &MakeArgs) -> Result<Request, Failure> {
         also: args.also.iter().map(|name| source(name)).collect(),
         shares: None,
         import: args.surface.options(),
-        material: args.size.material.clone(),
-        machine: args.machine.clone(),
+        material: material_named(&args.size.material).map_err(Failure::bad)?,
+        machine: machine_named(&args.machine).map_err(Failure::bad)?,
         sigma: args.size.sigma,
         hinge_width_mm: args.hinge,
         kerf_mm: args.kerf,

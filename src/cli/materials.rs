@@ -4,16 +4,18 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::profiles::{checked, fit, write_new};
+use super::profiles::{
+    Listed, Place, checked, fit, listed, machine_named, material_named, own_folder, show, write_new,
+};
 use super::{Failure, Global, Terminal, print, print_json};
 use crate::base::units::short;
-use crate::machine;
+use crate::machine::{self, Machine};
 use crate::material::{self, CutEntry, Material, Process};
 
 /// Options of `kagome materials`.
 #[derive(Args, Clone, Debug)]
 #[command(
-    after_help = "Examples:\n  kagome materials list --machine diode-400\n  kagome materials new mine --from leather-1.6\n  kagome materials check mine.toml\n  kagome make scan.obj --material mine.toml"
+    after_help = "Examples:\n  kagome materials list --machine diode-400\n  kagome materials new mine --from leather-1.6 --own\n  kagome materials check mine\n  kagome make scan.obj --material mine"
 )]
 pub struct MaterialsArgs {
     #[command(subcommand)]
@@ -30,12 +32,13 @@ enum What {
     },
     /// The profile of one
     Show {
-        /// A shipped name or a TOML file
+        /// The name of a shipped one or one of your own, or a TOML file
         name: String,
     },
     /// Whether a profile of your own is right
     Check {
-        /// A TOML file
+        /// A TOML file, or the name of one in your own folder
+        #[arg(value_name = "NAME|FILE")]
         file: String,
     },
     /// A profile of your own to start from, with an explanation of every key
@@ -48,6 +51,9 @@ enum What {
         /// The file to write [default: NAME.toml]
         #[arg(short, long, value_name = "FILE.toml")]
         output: Option<PathBuf>,
+        /// Write it into your own folder, where it is found by its name
+        #[arg(long, conflicts_with = "output")]
+        own: bool,
         /// Replace the file if it exists
         #[arg(long)]
         force: bool,
@@ -62,17 +68,20 @@ pub fn run(args: &MaterialsArgs, global: &Global, terminal: &Terminal) -> Result
     match &args.what {
         What::List { machine } => list(machine.as_deref(), global),
         What::Show { name } => {
-            let material = material::load(name).map_err(Failure::bad)?;
-            if global.json {
-                return print_json(&material);
-            }
-            match material::shipped().find(|(n, _)| n == name) {
-                Some((_, text)) => print(text.trim_end()),
-                None => print(&summary(&material)),
-            }
+            let found = material_named(name).map_err(Failure::bad)?;
+            let material = material::load(&found).map_err(Failure::bad)?;
+            let shipped = material::shipped().find(|(n, _)| n == name);
+            show(
+                &material,
+                name,
+                &found,
+                shipped.map(|(_, text)| text),
+                summary,
+                global,
+            )
         }
         What::Check { file } => {
-            let material = checked(material::load(file))?;
+            let material = checked(material_named(file).and_then(|found| material::load(&found)))?;
             if global.json {
                 return print_json(&material);
             }
@@ -82,45 +91,72 @@ pub fn run(args: &MaterialsArgs, global: &Global, terminal: &Terminal) -> Result
             name,
             from,
             output,
+            own,
             force,
         } => {
             let text = material::start(name, from).map_err(Failure::bad)?;
-            write_new(&text, name, output.as_deref(), *force, global, terminal)
+            let place = if *own {
+                Place::Own(material::own_file)
+            } else {
+                Place::File(output.as_deref())
+            };
+            write_new(&text, name, "--material", &place, *force, global, terminal)
         }
     }
 }
 
 fn list(machine: Option<&str>, global: &Global) -> Result<(), Failure> {
-    let mut all = Vec::new();
-    for (name, _) in material::shipped() {
-        all.push(material::load(name).map_err(Failure::bad)?);
-    }
-    let Some(machine) = machine else {
-        if global.json {
-            return print_json(&all);
+    let own = own_folder();
+    let all = listed(
+        material::shipped().map(|(name, _)| name),
+        match &own {
+            Some(own) => material::own_files(own).map_err(Failure::bad)?,
+            None => Vec::new(),
+        },
+        |name| material::load(&material::resolve(name, own.as_deref())?),
+        material::load,
+    )?;
+    let machine = match machine {
+        None => None,
+        Some(machine) => {
+            let found = machine_named(machine).map_err(Failure::bad)?;
+            Some(machine::load(&found).map_err(Failure::bad)?)
         }
-        for m in &all {
-            let mark = if m.name == material::DEFAULT {
-                " (default)"
-            } else {
-                ""
-            };
-            print(&format!("{:<16} {}{mark}", m.name, m.title))?;
-        }
-        return Ok(());
     };
-    let machine = machine::load(machine).map_err(Failure::bad)?;
     if global.json {
-        let rows: Vec<_> = all
-            .iter()
-            .map(|m| serde_json::json!({ "material": m, "machine": machine.name, "answer": fit(&machine, m).1 }))
-            .collect();
-        return print_json(&rows);
+        let rows: Result<Vec<_>, Failure> =
+            all.iter().map(|row| value(row, machine.as_ref())).collect();
+        return print_json(&rows?);
     }
-    for m in &all {
-        print(&format!("{:<16} {}", m.name, fit(&machine, m).0))?;
+    for row in &all {
+        let words = match (&row.profile, &machine) {
+            (Err(wrong), _) => format!("is not usable: {wrong}"),
+            (Ok(material), Some(machine)) => fit(machine, material).0,
+            (Ok(material), None) => format!("{}{}", material.title, default_mark(material)),
+        };
+        print(&format!("{:<16} {:<7} {words}", row.name, row.from()))?;
     }
     Ok(())
+}
+
+/// A row of the list for machines.
+fn value(row: &Listed<Material>, machine: Option<&Machine>) -> Result<serde_json::Value, Failure> {
+    let Some(machine) = machine else {
+        return row.value();
+    };
+    let answer = match &row.profile {
+        Ok(material) => fit(machine, material).1,
+        Err(wrong) => serde_json::json!({ "fit": "unknown", "why": wrong }),
+    };
+    Ok(serde_json::json!({ "material": row.value()?, "machine": machine.name, "answer": answer }))
+}
+
+fn default_mark(material: &Material) -> &'static str {
+    if material.name == material::DEFAULT {
+        " (default)"
+    } else {
+        ""
+    }
 }
 
 fn summary(m: &Material) -> String {

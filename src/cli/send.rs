@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::cut::drawing_of;
+use super::profiles::{machine_named, own_folder};
 use super::{Failure, Global, Terminal};
 use crate::base::progress::Progress as _;
 use crate::control::{Job, JobRules, SendError, SendOptions, SendReport, SerialTransport, send};
@@ -46,18 +47,24 @@ const STANDARD_BAUD: u32 = 115_200;
 /// without a profile to compare with.
 pub(super) fn machine_for(asked: Option<&str>, job: &[u8]) -> Result<Option<Machine>, Failure> {
     if let Some(name) = asked {
-        return machine::load(name).map(Some).map_err(Failure::bad);
+        let found = machine_named(name).map_err(Failure::bad)?;
+        return machine::load(&found).map(Some).map_err(Failure::bad);
     }
     let text = String::from_utf8_lossy(job);
     let Some(named) = gcode::machine_of(&text) else {
         return Ok(None);
     };
-    if !machine::shipped().any(|(shipped, _)| shipped == named) {
+    // What a header says is no path.
+    let own = own_folder().and_then(|own| machine::own_file(&own, named));
+    if !own.is_some_and(|file| file.is_file())
+        && !machine::shipped().any(|(shipped, _)| shipped == named)
+    {
         return Err(Failure::Bad(format!(
-            "the job was made for the machine {named}, which is not a shipped profile: name its file with --machine"
+            "the job was made for the machine {named}, which is neither a shipped profile nor one of your own: name its file with --machine"
         )));
     }
-    machine::load(named).map(Some).map_err(Failure::bad)
+    let found = machine_named(named).map_err(Failure::bad)?;
+    machine::load(&found).map(Some).map_err(Failure::bad)
 }
 
 /// The job must be good for the machine, and cut its sheet if the drawing lies beside it: what `verify` would say.

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::profiles::machine_named;
 use super::{Failure, Global, Terminal};
 use crate::base::progress::Progress as _;
 use crate::sim::pty::{Link, PtyServer, Serve};
@@ -50,7 +51,10 @@ fn speed(text: &str) -> Result<Speed, String> {
 
 /// Serves until Ctrl-C, or until the sender leaves.
 pub fn run(args: &SimArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
-    let machine = crate::machine::load(&args.machine).map_err(Failure::bad)?;
+    let machine = {
+        let found = machine_named(&args.machine).map_err(Failure::bad)?;
+        crate::machine::load(&found).map_err(Failure::bad)?
+    };
     if !machine.controller.is_streamed() {
         return Err(Failure::Bad(format!(
             "machine {} has {}, which opens jobs as files: there is no port to serve",

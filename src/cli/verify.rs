@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::cut::drawing_of;
+use super::profiles::machine_named;
 use super::send::machine_for;
 use super::{Failure, Global, Terminal, print, print_json};
 use crate::base::units::short;
@@ -45,7 +46,10 @@ pub fn run(args: &VerifyArgs, global: &Global, terminal: &Terminal) -> Result<()
     let text = read(&args.job)?;
     let machine = match machine_for(args.machine.as_deref(), text.as_bytes())? {
         Some(machine) => machine,
-        None => machine::load(machine::DEFAULT).map_err(Failure::bad)?,
+        None => {
+            let found = machine_named(machine::DEFAULT).map_err(Failure::bad)?;
+            machine::load(&found).map_err(Failure::bad)?
+        }
     };
     let sheet_path = args.sheet.clone().or_else(|| drawing_of(&args.job));
     let sheet = match &sheet_path {

@@ -14,7 +14,7 @@ mod verify;
 mod write;
 
 pub use compare::Slack;
-pub use interpret::{Beam, Dialect, Move, Program, read, read_as};
+pub use interpret::{Beam, Dialect, Move, Program, read, read_as, read_with};
 pub use ligament::Ligaments;
 pub use verify::{Finding, Rule, TOLERANCE_MM, Verdict, compare_burnt, verify};
 pub use write::{Declared, GcodeError, machine_of, passes_of, write};

@@ -9,12 +9,15 @@ use super::{
     Declared, Finding, GcodeError, Rule, Slack, TOLERANCE_MM, compare_burnt, passes_of, read,
     verify, write,
 };
+use crate::base::curve::Curve;
 use crate::base::ids::Id;
 use crate::linkage::{Handedness, Linkage, TriangleId};
 use crate::machine::{self, Machine};
 use crate::material;
 use crate::material::PassOrder;
-use crate::pattern::{Label, Mark, MarkKind, Sheet, SheetOptions, Tip, placed, read_svg, svg};
+use crate::pattern::{
+    Contour, Label, Mark, MarkKind, Sheet, SheetOptions, Tip, placed, read_svg, svg,
+};
 use crate::toolpath::{CornerSlowdown, CutOptions, Role, Toolpath, plan};
 
 /// The largest edge-connected part of a hexagon of cells without those of `removed`.
@@ -152,6 +155,16 @@ fn torch_job(
     marked: bool,
 ) -> (Sheet, String, Machine) {
     let machine = machine::load(machine_name).unwrap();
+    torch_job_on(machine, removed, marked, None)
+}
+
+/// The same with a round hole in the first triangle and the last.
+fn torch_job_on(
+    machine: Machine,
+    removed: &BTreeSet<usize>,
+    marked: bool,
+    hole_mm: Option<f64>,
+) -> (Sheet, String, Machine) {
     let material = material::load("steel-1.5").unwrap();
     let setting = material.cut_for(&machine).unwrap();
     let linkage = patch_of(50.0, Handedness::Right, removed);
@@ -162,6 +175,24 @@ fn torch_job(
     .unwrap();
     if marked {
         sheet.marks.push(name_mark(&sheet));
+    }
+    if let Some(hole_mm) = hole_mm {
+        let middle = |t: &[kurbo::Point; 3]| {
+            let sum = t.iter().fold(Vec2::ZERO, |s, p| s + p.to_vec2());
+            (sum / 3.0).to_point()
+        };
+        let mut places = vec![middle(&sheet.triangles[0])];
+        if sheet.triangles.len() > 1 {
+            places.push(middle(&sheet.triangles[sheet.triangles.len() - 1]));
+        }
+        // Ahead of the others, so that what comes first in the list need not be cut first.
+        sheet.contours.splice(
+            0..0,
+            places.into_iter().map(|at| Contour {
+                line: Curve::circle(at, 0.5 * hole_mm, false),
+                outer: false,
+            }),
+        );
     }
     let (sheet, _) = placed(&sheet, &machine, false).unwrap();
     let sheet = read_svg(&svg(&sheet)).unwrap();
@@ -196,6 +227,52 @@ proptest! {
         let program = super::read_as(&text, super::Dialect::of(&machine));
         let on = text.lines().filter(|l| *l == "M3" || (l.starts_with("M3 ") && !l.contains("$1"))).count();
         prop_assert_eq!(program.pierces.len(), on);
+    }
+
+    #[test]
+    fn small_holes_are_cut_slowly_and_left_with_the_torch_off_where_qtplasmac_does_it(
+        removed in removed(), torch in 0usize..3, hole_mm in 5.0..20.0f64, below_mm in 5.0..20.0f64,
+    ) {
+        let mut machine = machine::load(TORCHES[torch]).unwrap();
+        if let Some(small) = machine.plasma.as_mut().unwrap().small_hole.as_mut() {
+            small.below_mm = below_mm;
+        }
+        let (sheet, text, machine) = torch_job_on(machine, &removed, false, Some(hole_mm));
+        let verdict = verify(&text, &machine, Some(&sheet), None).unwrap();
+        prop_assert_eq!(&verdict.findings, &[], "{}", text);
+        let holes = if sheet.triangles.len() > 1 { 2 } else { 1 };
+        let small = if torch == 2 && hole_mm <= below_mm { holes } else { 0 };
+        prop_assert_eq!(text.matches("M62 P3\n").count(), small);
+        if small == 0 {
+            return Ok(());
+        }
+        // In each the torch burns the whole line once at 60 %, the other way round than a clock, and then goes on
+        // without burning for as far as the profile says.
+        let program = super::read_as(&text, super::Dialect::of(&machine));
+        let (mut off_mm, mut swept) = (0.0, 0.0);
+        let line_mm = (hole_mm - sheet.metadata.kerf_mm) * std::f64::consts::PI;
+        for (m, next) in program.moves.iter().zip(&program.moves[1..]) {
+            let way = m.to - m.from.unwrap_or(m.to);
+            if !m.rapid && !m.burns() {
+                off_mm += way.hypot();
+                prop_assert_eq!(m.feed_mm_per_min, 0.6 * 2600.0);
+                if !next.rapid && !next.burns() {
+                    swept += way.cross(next.to - m.to).signum();
+                }
+            }
+        }
+        let wanted = 4f64.min(0.5 * line_mm) * small as f64;
+        prop_assert!((off_mm - wanted).abs() < 0.01, "{off_mm} {wanted}");
+        prop_assert!(swept > 0.0);
+        // Held off one line earlier, the hole stays closed; never held off or never let go again, it shows as well.
+        let lines: Vec<&str> = text.lines().collect();
+        let at = lines.iter().position(|l| *l == "M62 P3").unwrap();
+        let mut early = lines.clone();
+        early.swap(at, at - 1);
+        prop_assert!(findings(&early.join("\n"), &machine, &sheet, 1).iter().any(|f| f.rule == Rule::Missing));
+        let kept = text.replace("M5 $0\nM68 E3 Q0\nM65 P2\nM65 P3\n", "M5 $0\nM68 E3 Q0\nM65 P2\n");
+        prop_assert!(kept != text);
+        prop_assert!(findings(&kept, &machine, &sheet, 1).iter().any(|f| f.rule == Rule::Missing));
     }
 
     #[test]
@@ -539,6 +616,59 @@ fn damage_to_a_torch_job_is_found_by_its_rule() {
             "{torch}, {from:?} → {to:?}: {rules:?}"
         );
     }
+}
+
+#[test]
+fn a_material_of_the_tables_own_list_is_selected_by_its_number_and_no_other_passes() {
+    let mut machine = machine::load("plasma-qtplasmac").unwrap();
+    let numbers = &mut machine.plasma.as_mut().unwrap().material_numbers;
+    numbers.insert("steel-1.5".into(), 7);
+    numbers.insert("plate-6".into(), 8);
+    machine.validate().unwrap();
+    let (sheet, text, machine) = torch_job_on(machine, &BTreeSet::new(), false, Some(12.0));
+    let select = "\nM190 P7\nM66 P3 L3 Q1\n";
+    assert!(text.contains(select) && !text.contains("(o="), "{text}");
+    assert!(text.contains("\nF#<_hal[plasmac.cut-feed-rate]>\n"));
+    assert_eq!(findings(&text, &machine, &sheet, 1), []);
+    // A reader who knows the table's feed sees the one of the job that brings its material.
+    let (_, inline, _) = torch_job_on(
+        machine::load("plasma-qtplasmac").unwrap(),
+        &BTreeSet::new(),
+        false,
+        Some(12.0),
+    );
+    let dialect = super::Dialect::of(&machine);
+    let feeds = |program: super::Program| -> Vec<f64> {
+        let all = program.moves.iter();
+        all.filter(|m| m.burns())
+            .map(|m| m.feed_mm_per_min)
+            .collect()
+    };
+    let known = feeds(super::read_with(&text, dialect, Some(2600.0)));
+    assert_eq!(known, feeds(super::read_as(&inline, dialect)));
+    for (to, rule, word) in [
+        ("\nM190 P8\nM66 P3 L3 Q1\n", Rule::Material, "`plate-6`"),
+        ("\nM190 P9\nM66 P3 L3 Q1\n", Rule::Material, "none"),
+        ("\nM190 P7\n", Rule::Feed, "M66 P3 L3 Q1"),
+        ("\nM190 P7\nM66 P2 L3 Q1\n", Rule::Feed, "M66 P3 L3 Q1"),
+        ("\nM190 P7.5\nM66 P3 L3 Q1\n", Rule::Syntax, "7.5"),
+        ("\n", Rule::Feed, "no material was chosen"),
+    ] {
+        let found = findings(&text.replacen(select, to, 1), &machine, &sheet, 1);
+        assert!(
+            found
+                .iter()
+                .any(|f| f.rule == rule && f.text.contains(word)),
+            "{to:?}: {found:?}"
+        );
+    }
+    // The number is of no use for a job that was made for another material.
+    let other = text.replacen("; material steel-1.5\n", "; material brass-1.5\n", 1);
+    let found = findings(&other, &machine, &sheet, 1);
+    assert_eq!(
+        found.iter().map(|f| f.rule).collect::<Vec<_>>(),
+        [Rule::Material]
+    );
 }
 
 #[test]

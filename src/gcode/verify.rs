@@ -8,7 +8,7 @@ use super::compare::{Kind, NO_GAP_MM, Slack, Wanted, compare};
 use super::coverage::Segment;
 use super::interpret::{Beam, Dialect, Program, read_as};
 use super::ligament::{Ligaments, Outside, check_order, check_pierces, measure};
-use super::write::{Declared, passes_of};
+use super::write::{Declared, material_of, passes_of};
 use crate::base::units::short;
 use crate::machine::{Machine, PowerMode};
 use crate::pattern::Sheet;
@@ -40,6 +40,8 @@ pub enum Rule {
     Height,
     /// M3 only where the machine's profile accepts it.
     ConstantPower,
+    /// The material that the job selects at the table is the one that it was made for.
+    Material,
     /// Every burning move has a feed above 0 and within the machine's rates.
     Feed,
     /// Power within the machine's scale.
@@ -139,6 +141,7 @@ pub fn verify(
     let mut findings = program.findings.clone();
     check_lines(text, machine, &mut findings);
     check_moves(&program, machine, &mut findings);
+    check_materials(&program, text, machine, &mut findings);
     let length = |rapid: bool| -> f64 {
         program
             .moves
@@ -326,6 +329,40 @@ fn check_moves(program: &Program, machine: &Machine, findings: &mut Vec<Finding>
                 ),
             );
         }
+    }
+}
+
+/// A number in the table's list is only a number: heights, current and feed are whatever stands there. The profile knows
+/// which material it is, and the job's header which one is meant.
+fn check_materials(program: &Program, text: &str, machine: &Machine, findings: &mut Vec<Finding>) {
+    let Some(torch) = machine.plasma() else {
+        return;
+    };
+    let numbers = &torch.material_numbers;
+    let meant = material_of(text);
+    for &(line, number) in &program.materials {
+        let right = meant.and_then(|name| numbers.get(name));
+        if right == Some(&number) || (right.is_none() && numbers.is_empty()) {
+            continue;
+        }
+        let is = numbers.iter().find(|(_, n)| **n == number);
+        let is = is.map_or(
+            "none that the machine's profile names".into(),
+            |(name, _)| format!("`{name}`"),
+        );
+        let text = match (meant, right) {
+            (Some(name), Some(right)) => format!(
+                "material {number} of the table is {is}; `{name}`, for which the job was made, is {right} there"
+            ),
+            (Some(name), None) => format!(
+                "material {number} of the table is {is}, and the job was made for `{name}` (plasma.material_numbers)"
+            ),
+            (None, _) if numbers.values().any(|n| *n == number) => continue,
+            (None, _) => {
+                format!("material {number} of the table is {is} (plasma.material_numbers)")
+            }
+        };
+        findings.push(Finding::at(line, Rule::Material, text));
     }
 }
 

@@ -173,14 +173,19 @@ fn rehearsed(
 /// How long a torch takes, s: the planner's time for its motion, a stop and the pierce delay for every cut. What height
 /// control takes for its probing is not in it.
 fn estimated_s(gcode: &str, machine: &Machine, setting: &CutSetting) -> f64 {
-    let program = gcode::read_as(gcode, gcode::Dialect::of(machine));
+    let program = gcode::read_with(
+        gcode,
+        gcode::Dialect::of(machine),
+        Some(setting.speed_mm_per_min),
+    );
     let wait_s = setting.torch.map_or(0.0, |t| t.pierce_delay_s);
     let mut motions = Vec::with_capacity(program.moves.len() + 2 * program.pierces.len());
-    let mut burning = false;
+    let mut cutting = false;
     for m in &program.moves {
-        if m.burns() != burning {
-            burning = m.burns();
-            let wait_s = if burning { wait_s } else { 0.0 };
+        // A torch that is held off in a cut does not stop for it.
+        if m.rapid == cutting {
+            cutting = !m.rapid;
+            let wait_s = if cutting { wait_s } else { 0.0 };
             motions.push(Motion::Stop { wait_s });
         }
         let way = m.from.map_or(Vec2::ZERO, |from| m.to - from);

@@ -14,8 +14,9 @@ mod tool;
 
 pub use controller::{Controller, ControllerLimits};
 pub use profile::{Axes, Bed, Connection, Homing, Job, Machine, Motion, Origin, Place, Reach};
-pub use shipped::{DEFAULT, load, parse, shipped};
+pub use shipped::{DEFAULT, load, own_file, own_files, parse, resolve, shipped};
 pub use start::{ControllerSettings, start};
 pub use tool::{
-    Corner, HeightControl, LaserTool, PLACEHOLDERS, PlasmaTool, PowerMode, Template, Tool, filled,
+    Corner, HeightControl, LaserTool, PLACEHOLDERS, PlasmaTool, PowerMode, SmallHole, Template,
+    Tool, filled,
 };

@@ -1,5 +1,7 @@
 //! The machines in the binary, and machines from files.
 
+use std::path::{Path, PathBuf};
+
 use super::profile::Machine;
 use crate::base::catalog::{Catalog, CatalogError};
 use crate::base::document::{Document, DocumentError};
@@ -39,6 +41,7 @@ const SHIPPED: &[(&str, &str)] = &[
 
 pub(super) const CATALOG: Catalog = Catalog {
     kind: "machine",
+    folder: "machines",
     shipped: SHIPPED,
 };
 
@@ -55,6 +58,28 @@ pub fn load(name_or_path: &str) -> Result<Machine, CatalogError> {
     CATALOG.load(name_or_path, parse)
 }
 
+/// What [`load`] takes for a name or a path, where a person has a folder `own` of profiles: `machines/NAME.toml` in it
+/// comes before a shipped machine called NAME, and becomes its path.
+///
+/// # Errors
+/// [`CatalogError`] for a profile of one's own that is wrong, and for a name that nobody knows.
+pub fn resolve(name_or_path: &str, own: Option<&Path>) -> Result<String, CatalogError> {
+    CATALOG.resolve(name_or_path, own, |file, text| Ok(parse(file, text)?.name))
+}
+
+/// The machines in a person's own folder, names with files.
+///
+/// # Errors
+/// [`CatalogError::Folder`].
+pub fn own_files(own: &Path) -> Result<Vec<(String, PathBuf)>, CatalogError> {
+    CATALOG.own_files(own)
+}
+
+/// Where a person's own machine of this name belongs; none for what is no name.
+pub fn own_file(own: &Path, name: &str) -> Option<PathBuf> {
+    CATALOG.own_file(own, name)
+}
+
 /// A machine from the text of a profile; `file` is what messages call it.
 ///
 /// # Errors
@@ -65,8 +90,6 @@ pub fn parse(file: &str, text: &str) -> Result<Machine, DocumentError> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
 
     #[test]
@@ -233,6 +256,48 @@ mod tests {
                 "angle_deg = 60",
                 "angle_deg = 181",
                 "plasma.corner.angle_deg",
+            ),
+            (
+                "plasma-qtplasmac",
+                "below_mm = 32",
+                "below_mm = 0",
+                "plasma.small_hole.below_mm",
+            ),
+            (
+                "plasma-qtplasmac",
+                "32, percent = 60",
+                "32, percent = 101",
+                "plasma.small_hole.percent",
+            ),
+            (
+                "plasma-qtplasmac",
+                "overcut_mm = 4",
+                "overcut_mm = 0",
+                "plasma.small_hole.overcut_mm",
+            ),
+            (
+                "plasma-qtplasmac",
+                "scribe = true\n",
+                "material_numbers = { \"steel-1.5\" = 1000000 }\n",
+                "plasma.material_numbers.steel-1.5",
+            ),
+            (
+                "plasma-qtplasmac",
+                "scribe = true\n",
+                "material_numbers = { \"Steel 1.5\" = 3 }\n",
+                "plasma.material_numbers.Steel 1.5",
+            ),
+            (
+                "plasma-linuxcnc",
+                "max_amps",
+                "small_hole = { below_mm = 32, percent = 60, overcut_mm = 4 }\nmax_amps",
+                "plasma.small_hole",
+            ),
+            (
+                "plasma-linuxcnc",
+                "max_amps",
+                "material_numbers = { \"steel-1.5\" = 3 }\nmax_amps",
+                "plasma.material_numbers",
             ),
             (
                 "plasma-qtplasmac",

@@ -84,6 +84,12 @@ fn explain(table: &str, key: &str) -> Option<&'static str> {
         ("plasma", "corner") => {
             "slower round corners: per cent of the speed, so far before and after, from this angle on"
         }
+        ("plasma", "small_hole") => {
+            "QtPlasmaC: holes smaller across than below_mm at this per cent of the speed, and past their end with the torch off"
+        }
+        ("plasma", "material_numbers") => {
+            "numbers in QtPlasmaC's own list of materials, by the names of profiles here"
+        }
         ("plasma.template", "") => {
             "the lines round every cut; in braces: pierce_height_mm, pierce_delay_s, cut_height_mm, safe_height_mm, feed_mm_per_min, amps"
         }

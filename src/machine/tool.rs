@@ -1,11 +1,13 @@
 //! What cuts: a laser or a plasma torch.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::controller::Controller;
 use super::lines::{self, Where};
 use crate::base::document::{Complaint, ranged};
-use crate::material::{Laser, Process};
+use crate::material::{Laser, Process, check_name};
 
 /// How the beam follows the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -62,6 +64,19 @@ pub struct Corner {
     pub angle_deg: f64,
 }
 
+/// Small holes, which a torch cuts slowly and leaves in an arc without a mark: `small_hole` in `[plasma]`. QtPlasmaC's
+/// outputs do it: M67 E3 lowers the speed, M62 P3 holds the torch off while the head goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SmallHole {
+    /// Holes that nowhere measure more than this across, millimetres.
+    pub below_mm: f64,
+    /// Speed there, per cent of the cut's.
+    pub percent: f64,
+    /// How far the head goes on past the hole's beginning with the torch held off, millimetres.
+    pub overcut_mm: f64,
+}
+
 /// The lines round every cut of a torch that the job moves: `[plasma.template]`. In braces stand the figures of the
 /// material and the machine: see [`PLACEHOLDERS`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -100,6 +115,13 @@ pub struct PlasmaTool {
     /// Slower round corners; as fast as elsewhere if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub corner: Option<Corner>,
+    /// How small holes are cut, with `height_control = "qtplasmac"`; like large ones if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub small_hole: Option<SmallHole>,
+    /// Numbers in QtPlasmaC's own list of materials, by the names of our material profiles: a job for one of these
+    /// selects it there (M190) and takes its feed, heights and currents. A job for any other brings its own figures.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub material_numbers: BTreeMap<String, u32>,
     /// The lines round every cut, with `height_control = "plain"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub template: Option<Template>,
@@ -165,6 +187,12 @@ impl PlasmaTool {
             ranged("plasma.corner.distance_mm", corner.distance_mm, 0.1, 100.0)?;
             ranged("plasma.corner.angle_deg", corner.angle_deg, 1.0, 180.0)?;
         }
+        if let Some(hole) = self.small_hole {
+            ranged("plasma.small_hole.below_mm", hole.below_mm, 0.1, 1000.0)?;
+            ranged("plasma.small_hole.percent", hole.percent, 10.0, 100.0)?;
+            // Without a way to go on, the torch would not be held off at all.
+            ranged("plasma.small_hole.overcut_mm", hole.overcut_mm, 0.5, 50.0)?;
+        }
         match self.height_control {
             HeightControl::QtPlasmaC => self.check_qtplasmac(controller),
             HeightControl::Plain => self.check_plain(controller, limit),
@@ -186,6 +214,17 @@ impl PlasmaTool {
                 "stands beside height_control = \"qtplasmac\", which probes and pierces by itself: a line with Z would fight it. Remove the template, or write height_control = \"plain\"",
             ));
         }
+        for (material, number) in &self.material_numbers {
+            let key = format!("plasma.material_numbers.{material}");
+            if let Err(wrong) = check_name(material) {
+                return Err(Complaint::new(
+                    key,
+                    format!("is for a material whose name {}", wrong.problem),
+                ));
+            }
+            // From a million on QtPlasmaC numbers those that jobs bring.
+            ranged(&key, f64::from(*number), 0.0, 999_999.0)?;
+        }
         Ok(())
     }
 
@@ -194,6 +233,17 @@ impl PlasmaTool {
             return Err(Complaint::new(
                 "plasma.scribe",
                 "is true, and only QtPlasmaC has a word for the scribe",
+            ));
+        }
+        if self.small_hole.is_some() || !self.material_numbers.is_empty() {
+            let key = if self.small_hole.is_some() {
+                "plasma.small_hole"
+            } else {
+                "plasma.material_numbers"
+            };
+            return Err(Complaint::new(
+                key,
+                "stands beside height_control = \"plain\", and only QtPlasmaC has words for it: remove it",
             ));
         }
         let Some(template) = &self.template else {

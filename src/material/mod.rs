@@ -15,5 +15,5 @@ pub use cut::{CutEntry, EngraveEntry, Laser, PassOrder, Process};
 pub use fit::{CutError, CutSetting, Fit, MarkSetting, TorchSetting, classify};
 pub use profile::{Kind, Material, Sigma, Source, StockSize, Tip, TipShape};
 pub(crate) use profile::{check_format, check_name};
-pub use shipped::{DEFAULT, load, parse, shipped};
+pub use shipped::{DEFAULT, load, own_file, own_files, parse, resolve, shipped};
 pub use start::start;

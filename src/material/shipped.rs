@@ -1,5 +1,7 @@
 //! The materials in the binary, and materials from files.
 
+use std::path::{Path, PathBuf};
+
 use super::profile::Material;
 use crate::base::catalog::{Catalog, CatalogError};
 use crate::base::document::{Document, DocumentError};
@@ -30,6 +32,7 @@ const SHIPPED: &[(&str, &str)] = &[
 
 pub(super) const CATALOG: Catalog = Catalog {
     kind: "material",
+    folder: "profiles",
     shipped: SHIPPED,
 };
 
@@ -46,6 +49,28 @@ pub fn load(name_or_path: &str) -> Result<Material, CatalogError> {
     CATALOG.load(name_or_path, parse)
 }
 
+/// What [`load`] takes for a name or a path, where a person has a folder `own` of profiles: `profiles/NAME.toml` in it
+/// comes before a shipped material called NAME, and becomes its path.
+///
+/// # Errors
+/// [`CatalogError`] for a profile of one's own that is wrong, and for a name that nobody knows.
+pub fn resolve(name_or_path: &str, own: Option<&Path>) -> Result<String, CatalogError> {
+    CATALOG.resolve(name_or_path, own, |file, text| Ok(parse(file, text)?.name))
+}
+
+/// The materials in a person's own folder, names with files.
+///
+/// # Errors
+/// [`CatalogError::Folder`].
+pub fn own_files(own: &Path) -> Result<Vec<(String, PathBuf)>, CatalogError> {
+    CATALOG.own_files(own)
+}
+
+/// Where a person's own material of this name belongs; none for what is no name.
+pub fn own_file(own: &Path, name: &str) -> Option<PathBuf> {
+    CATALOG.own_file(own, name)
+}
+
 /// A material from the text of a profile; `file` is what messages call it.
 ///
 /// # Errors
@@ -56,8 +81,6 @@ pub fn parse(file: &str, text: &str) -> Result<Material, DocumentError> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
 
     #[test]

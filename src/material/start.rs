@@ -67,7 +67,7 @@ pub fn start(name: &str, from: &str) -> Result<String, StartError> {
     check_name(name).map_err(|c| StartError::Name(c.problem))?;
     let text = renamed(&CATALOG, name, from)?;
     let text = format!(
-        "# A material for kagome, made from the shipped {from}. Lengths in millimetres.\n# Change what differs, then: kagome materials check FILE\n{}",
+        "# A material for kagome, made from the shipped {from}. Lengths in millimetres.\n# Change what differs, then: kagome materials check FILE\n# price_per_m2 = PRICE and currency = \"EUR\" below its title make reports say what a sheet costs.\n{}",
         annotated(&text, explain)
     );
     parse(name, &text)?;

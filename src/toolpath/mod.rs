@@ -14,5 +14,5 @@ mod star;
 pub use kerf::{CHORD_ERROR_MM, outline, without_tabs};
 pub use order::{Heat, LOOKBACK, Spacing, order_strokes, spacing};
 pub use path::{
-    CornerSlowdown, Cut, CutOptions, Figures, Role, Step, Toolpath, ToolpathError, plan,
+    CornerSlowdown, Cut, CutOptions, Figures, Role, SmallHoles, Step, Toolpath, ToolpathError, plan,
 };

@@ -3,12 +3,12 @@
 use kurbo::Point;
 
 use super::order::Heat;
-use super::scrap::Scrap;
+use super::scrap::{Scrap, Side};
 use super::{kerf, order, star};
 use crate::base::curve::{Curve, Piece};
 use crate::machine::Machine;
 use crate::material::{CutSetting, MarkSetting, PassOrder};
-use crate::pattern::{Sheet, Star};
+use crate::pattern::{Contour, Sheet, Star};
 
 /// What a cut is for; also the order in which cuts are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
@@ -58,6 +58,10 @@ pub struct Cut {
     pub slow_mm: Vec<(f64, f64)>,
     /// Speed along them, per cent of the cut's own.
     pub slow_percent: f64,
+    /// Speed along everything else, leads included, per cent of the cut's own.
+    pub percent: f64,
+    /// The torch is held off along the way out, and the head goes on: nothing is burnt there.
+    pub off_on_way_out: bool,
 }
 
 /// A piece of a cut with the speed along it.
@@ -67,6 +71,8 @@ pub struct Step {
     pub piece: Piece,
     /// Per cent of the cut's speed.
     pub speed_percent: f64,
+    /// The torch is held off: nothing is burnt.
+    pub off: bool,
 }
 
 impl Cut {
@@ -101,11 +107,12 @@ impl Cut {
         }
     }
 
-    /// All that is burnt, in order: the way in, every pass, the way out.
+    /// The whole way of the head, in order: the way in, every pass, the way out.
     pub fn steps(&self) -> Vec<Step> {
-        let full = |piece| Step {
+        let step = |piece, off| Step {
             piece,
-            speed_percent: 100.0,
+            speed_percent: self.percent,
+            off,
         };
         let there = self.slowed();
         let back: Vec<Step> = if self.passes > 1 && !self.is_closed() {
@@ -121,12 +128,14 @@ impl Cut {
             Vec::new()
         };
         let mut steps = Vec::with_capacity(there.len() * self.passes as usize + 2);
-        steps.extend(self.lead_in.iter().flat_map(Curve::pieces).map(full));
+        let ways_in = self.lead_in.iter().flat_map(Curve::pieces);
+        steps.extend(ways_in.map(|piece| step(piece, false)));
         for pass in 0..self.passes {
             let turned = pass % 2 == 1 && !self.is_closed();
             steps.extend_from_slice(if turned { &back } else { &there });
         }
-        steps.extend(self.lead_out.iter().flat_map(Curve::pieces).map(full));
+        let ways_out = self.lead_out.iter().flat_map(Curve::pieces);
+        steps.extend(ways_out.map(|piece| step(piece, self.off_on_way_out)));
         steps
     }
 
@@ -143,6 +152,7 @@ impl Cut {
                     steps.push(Step {
                         piece,
                         speed_percent,
+                        off: false,
                     });
                     at = to;
                 }
@@ -153,11 +163,11 @@ impl Cut {
                     (to - before).clamp(0.0, length),
                 );
                 if to > from {
-                    push(from, 100.0);
+                    push(from, self.percent);
                     push(to, self.slow_percent);
                 }
             }
-            push(length, 100.0);
+            push(length, self.percent);
             before += length;
         }
         steps
@@ -165,7 +175,8 @@ impl Cut {
 
     /// Length of everything that is burnt, millimetres.
     pub fn burnt_mm(&self) -> f64 {
-        let ways = [&self.lead_in, &self.lead_out];
+        let out = self.lead_out.as_ref().filter(|_| !self.off_on_way_out);
+        let ways = [self.lead_in.as_ref(), out];
         let leads: f64 = ways.into_iter().flatten().map(Curve::length).sum();
         self.length_mm() * f64::from(self.passes) + leads
     }
@@ -272,6 +283,18 @@ pub struct CornerSlowdown {
     pub percent: f64,
 }
 
+/// How a torch cuts small holes: slowly, with the part on its right, and held off before the head stops. An arc leans
+/// back and swirls: fast or the other way round a small hole comes out conical, and where it stops, with a notch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SmallHoles {
+    /// Holes that nowhere measure more than this across, millimetres.
+    pub below_mm: f64,
+    /// Per cent of the cut's speed.
+    pub percent: f64,
+    /// How far the head goes on past the hole's beginning, the torch held off, millimetres.
+    pub overcut_mm: f64,
+}
+
 /// How cuts are made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutOptions {
@@ -293,6 +316,8 @@ pub struct CutOptions {
     pub overcut_mm: f64,
     /// Slower corners.
     pub corner: Option<CornerSlowdown>,
+    /// Small holes; like large ones if there is nothing here. Only for a torch that the job can hold off in motion.
+    pub small_holes: Option<SmallHoles>,
     /// What it costs to cut close to the cuts just made.
     pub heat: Heat,
     /// Speed (mm/min) and power (per cent) for marks; without them none are engraved.
@@ -303,6 +328,7 @@ impl CutOptions {
     /// As the profiles say; marks are engraved if there are settings for them.
     pub fn of(setting: &CutSetting, machine: &Machine, marks: Option<&MarkSetting>) -> Self {
         let corner = machine.plasma().and_then(|torch| torch.corner);
+        let small_hole = machine.plasma().and_then(|torch| torch.small_hole);
         Self {
             feed_mm_per_min: setting.speed_mm_per_min,
             power_percent: setting.power_percent,
@@ -316,6 +342,11 @@ impl CutOptions {
                 angle: c.angle_deg.to_radians(),
                 distance_mm: c.distance_mm,
                 percent: c.percent,
+            }),
+            small_holes: small_hole.map(|h| SmallHoles {
+                below_mm: h.below_mm,
+                percent: h.percent,
+                overcut_mm: h.overcut_mm,
             }),
             heat: Heat::NONE,
             engrave: marks.map(|m| (m.speed_mm_per_min, m.power_percent)),
@@ -375,6 +406,8 @@ impl Planner<'_> {
             feed_mm_per_min: self.options.feed_mm_per_min,
             passes,
             slow_percent: self.options.corner.map_or(100.0, |c| c.percent),
+            percent: 100.0,
+            off_on_way_out: false,
         };
         self.at = cut.end().unwrap_or(self.at);
         self.cuts.push(cut);
@@ -523,7 +556,22 @@ impl Planner<'_> {
         }
         while let Some(next) = nearest(left.iter().map(|(_, line)| line), self.at) {
             let (contour, outline) = left.swap_remove(next);
-            let ways = scrap.enter(contour, &outline, self.options, kerf_mm, self.at)?;
+            if role == Role::Inner
+                && let Some(small) = self.options.small_holes
+                && across_is_below(&contour.line, small.below_mm)
+                && kerf::without_tabs(&outline.opened_at(0, 0.0), &sheet.tabs, kerf_mm).is_empty()
+            {
+                self.small_hole(contour, &outline, small, scrap, kerf_mm)?;
+                continue;
+            }
+            let ways = scrap.enter(
+                contour,
+                &outline,
+                self.options,
+                kerf_mm,
+                self.at,
+                Side::Right,
+            )?;
             let stretches = kerf::without_tabs(&ways.line, &sheet.tabs, kerf_mm);
             if stretches.is_empty() {
                 self.push(role, ways.line, self.options.passes);
@@ -537,6 +585,58 @@ impl Planner<'_> {
         }
         Ok(())
     }
+
+    /// A small hole: the other way round than `outline`, so that the part is on the right, and past its beginning with
+    /// the torch held off.
+    fn small_hole(
+        &mut self,
+        contour: &Contour,
+        outline: &Curve,
+        small: SmallHoles,
+        scrap: &Scrap,
+        kerf_mm: f64,
+    ) -> Result<(), ToolpathError> {
+        let options = CutOptions {
+            overcut_mm: small.overcut_mm,
+            lead_out_mm: 0.0,
+            ..*self.options
+        };
+        let ways = scrap.enter(
+            contour,
+            &outline.reversed(),
+            &options,
+            kerf_mm,
+            self.at,
+            Side::Left,
+        )?;
+        self.push(Role::Inner, ways.line, self.options.passes);
+        self.lead(ways.lead_in, ways.lead_out);
+        if let Some(cut) = self.cuts.last_mut() {
+            cut.percent = small.percent;
+            cut.off_on_way_out = true;
+            if cut.slow_percent >= small.percent {
+                cut.slow_mm.clear();
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether no two points of a closed line are farther apart than `limit_mm`.
+fn across_is_below(line: &Curve, limit_mm: f64) -> bool {
+    let points = line.flattened(kerf::CHORD_ERROR_MM);
+    // Almost all that is larger is so along an axis.
+    let [mut low, mut high] = [points.first().copied().unwrap_or_default(); 2];
+    for p in &points {
+        low = Point::new(low.x.min(p.x), low.y.min(p.y));
+        high = Point::new(high.x.max(p.x), high.y.max(p.y));
+    }
+    if (high.x - low.x).max(high.y - low.y) > limit_mm {
+        return false;
+    }
+    let all = points.iter().enumerate();
+    all.flat_map(|(i, a)| points[..i].iter().map(|b| a.distance(*b)))
+        .all(|d| d <= limit_mm)
 }
 
 /// The line with the point nearest to the head; none of none.

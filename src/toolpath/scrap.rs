@@ -93,6 +93,8 @@ impl Scrap {
 
     /// The ways into and out of a closed outline, and the outline as an open line from where they meet it.
     ///
+    /// `side` is where the scrap lies, seen along the outline.
+    ///
     /// With a pierce no wider than the kerf and no leads asked for, the line begins at the vertex nearest to `head`.
     ///
     /// # Errors
@@ -104,6 +106,7 @@ impl Scrap {
         options: &CutOptions,
         kerf_mm: f64,
         head: Point,
+        side: Side,
     ) -> Result<Ways, ToolpathError> {
         let nearest_vertex = || {
             let vertices = outline.vertices.iter().enumerate();
@@ -120,7 +123,7 @@ impl Scrap {
                 .pieces()
                 .next_back()
                 .map_or(Vec2::ZERO, |p| p.direction(1.0));
-            let lead_out = self.leave(&line, along, options, kerf_mm);
+            let lead_out = self.leave(&line, along, options, kerf_mm, side);
             return Ok(Ways {
                 lead_in: None,
                 line,
@@ -139,10 +142,10 @@ impl Scrap {
         for (slant, length) in ways(options, kerf_mm) {
             for (index, piece) in &pieces {
                 let (at, along) = (piece.at(0.5), piece.direction(0.5));
-                let pierce = at + lead(along, slant, 1.0) * length;
+                let pierce = at + lead(along, slant, side) * length;
                 if self.is_free(pierce, at, options.pierce_mm, kerf_mm) {
                     let line = outline.opened_at(*index, 0.5);
-                    let lead_out = self.leave(&line, along, options, kerf_mm);
+                    let lead_out = self.leave(&line, along, options, kerf_mm, side);
                     let lead_in = Some(Curve::line(pierce, at));
                     return Ok(Ways {
                         lead_in,
@@ -180,7 +183,7 @@ impl Scrap {
         let back = line.reversed();
         for (slant, length) in ways(options, kerf_mm) {
             // Scrap is on the right of the outline, and on the left of the way back.
-            for (line, side) in [(&line, 1.0), (&back, -1.0)] {
+            for (line, side) in [(&line, Side::Right), (&back, Side::Left)] {
                 let Some(first) = line.pieces().next() else {
                     continue;
                 };
@@ -203,6 +206,7 @@ impl Scrap {
         along: Vec2,
         options: &CutOptions,
         kerf_mm: f64,
+        side: Side,
     ) -> Option<Curve> {
         let over = options.overcut_mm.min(0.5 * line.length());
         let mut way = if over > 0.0 {
@@ -217,7 +221,7 @@ impl Scrap {
         if options.lead_out_mm > 0.0 {
             // The way in, mirrored.
             let found = SLANTS.iter().find_map(|slant| {
-                let out = end - lead(along, *slant, -1.0) * options.lead_out_mm;
+                let out = end - lead(along, *slant, side.other()) * options.lead_out_mm;
                 self.is_free(out, end, kerf_mm, kerf_mm).then_some(out)
             });
             if let Some(out) = found {
@@ -253,6 +257,22 @@ impl Scrap {
     }
 }
 
+/// A side of a line, seen along it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Side {
+    Left,
+    Right,
+}
+
+impl Side {
+    fn other(self) -> Self {
+        match self {
+            Self::Left => Self::Right,
+            Self::Right => Self::Left,
+        }
+    }
+}
+
 /// A closed outline with its ways in and out.
 pub(super) struct Ways {
     /// From the pierce to the line.
@@ -285,9 +305,12 @@ fn ways(options: &CutOptions, kerf_mm: f64) -> Vec<(f64, f64)> {
     all
 }
 
-/// From the outline back into the scrap where a lead-in comes from: on the right of the direction `along` for a `side` of
-/// 1, on its left for −1.
-fn lead(along: Vec2, slant: f64, side: f64) -> Vec2 {
+/// From the outline back into the scrap where a lead-in comes from, on this side of the direction `along`.
+fn lead(along: Vec2, slant: f64, side: Side) -> Vec2 {
     let right = Vec2::new(along.y, -along.x);
-    right * (side * slant.sin()) - along * slant.cos()
+    let aside = match side {
+        Side::Right => right,
+        Side::Left => -right,
+    };
+    aside * slant.sin() - along * slant.cos()
 }

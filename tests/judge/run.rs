@@ -9,6 +9,7 @@ pub fn kagome(args: &[&str], folder: &Path) -> Output {
     let program =
         std::env::var("KAGOME_BIN").unwrap_or_else(|_| env!("CARGO_BIN_EXE_kagome").into());
     Command::new(program)
+        .env("KAGOME_PROFILES", "")
         .args(args)
         .current_dir(folder)
         .output()

@@ -37,6 +37,7 @@ pub(super) struct Block {
     pub r: Option<f64>,
     pub p: Option<f64>,
     pub q: Option<f64>,
+    pub l: Option<f64>,
     pub e: Option<f64>,
     pub f: Option<Value>,
     pub s: Option<f64>,
@@ -56,6 +57,8 @@ pub(super) struct Block {
     pub output: Option<Output>,
     /// M190: a material of the table's own.
     pub material: bool,
+    /// M66: until an input changes.
+    pub waits: bool,
     pub end: bool,
 }
 
@@ -104,8 +107,9 @@ impl Block {
                 '$' => once(&mut block.tool, number, "$")?,
                 'F' => once(&mut block.f, value, "F")?,
                 'S' => once(&mut block.s, number, "S")?,
-                // A tool's or an input's number; the wait's kind.
-                'H' | 'L' if dialect.is_linuxcnc() => {}
+                'L' if dialect.is_linuxcnc() => once(&mut block.l, number, "L")?,
+                // A tool's number.
+                'H' if dialect.is_linuxcnc() => {}
                 'N' | 'T' => {}
                 // G and M numbers are compared in tenths: G38.2 is not G38.
                 'G' => {
@@ -169,8 +173,9 @@ impl Block {
             50 => once(&mut self.beam, Beam::Off, "the beam")?,
             20 | 300 => self.end = true,
             0 | 10 | 70 | 80 | 90 => {}
-            // Tool change, adaptive feed, waiting for an input.
-            60 | 520 | 530 | 660 if dialect.is_linuxcnc() => {}
+            // Tool change, adaptive feed.
+            60 | 520 | 530 if dialect.is_linuxcnc() => {}
+            660 if dialect.is_linuxcnc() => self.waits = true,
             620 if dialect.is_linuxcnc() => {
                 once(&mut self.output, digital(true, true), "an output")?
             }

@@ -120,6 +120,8 @@ pub struct Program {
     pub constant_power: Vec<usize>,
     /// Places where a torch pierces, with the lines.
     pub pierces: Vec<(usize, Point)>,
+    /// Numbers in QtPlasmaC's own list of materials that are selected (M190), with the lines.
+    pub materials: Vec<(usize, u32)>,
     /// Lines of the text.
     pub lines: usize,
 }
@@ -151,6 +153,12 @@ pub fn read(text: &str) -> Program {
 /// Reads G-code. Never fails: what is wrong becomes a [`Finding`] with its line, and reading goes on, as a controller
 /// would.
 pub fn read_as(text: &str, dialect: Dialect) -> Program {
+    read_with(text, dialect, None)
+}
+
+/// [`read_as`] by someone who knows the feed (mm/min) of the material that a job selects from QtPlasmaC's own list: it
+/// stands in the moves in place of NaN.
+pub fn read_with(text: &str, dialect: Dialect, table_feed: Option<f64>) -> Program {
     let mut state = State {
         dialect,
         motion: None,
@@ -160,7 +168,7 @@ pub fn read_as(text: &str, dialect: Dialect) -> Program {
         feed: 0.0,
         power: 0.0,
         beam: Beam::Off,
-        torch: Torch::default(),
+        torch: Torch::new(table_feed),
         ended: false,
         chords: Some(ALL_CHORDS),
     };
@@ -169,6 +177,7 @@ pub fn read_as(text: &str, dialect: Dialect) -> Program {
         findings: Vec::new(),
         constant_power: Vec::new(),
         pierces: Vec::new(),
+        materials: Vec::new(),
         lines: 0,
     };
     // A second `%` ends LinuxCNC's programs.
@@ -215,6 +224,9 @@ pub fn read_as(text: &str, dialect: Dialect) -> Program {
             },
         ));
     }
+    if dialect.is_linuxcnc() && !state.ended && percents >= 2 {
+        state.left_behind(program.lines, &mut program);
+    }
     if dialect.is_linuxcnc() && !state.ended && percents < 2 {
         program.findings.push(Finding::at(
             program.lines,
@@ -250,6 +262,13 @@ impl State {
         match block.f {
             Some(Value::Number(f)) => self.feed = f * unit,
             Some(Value::MaterialFeed) => {
+                if self.torch.changing {
+                    say(
+                        Rule::Feed,
+                        "the feed is taken before the table has changed to the material (M190): a line M66 P3 L3 Q1 belongs between"
+                            .into(),
+                    );
+                }
                 if self.torch.material_feed == Some(0.0) {
                     say(
                         Rule::Feed,
@@ -280,6 +299,9 @@ impl State {
                             .into()
                     },
                 ));
+            }
+            if self.dialect.is_linuxcnc() {
+                self.left_behind(line, program);
             }
             self.ended = true;
         }

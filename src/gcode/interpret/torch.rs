@@ -25,12 +25,21 @@ pub(super) struct Torch {
     pub enabled: bool,
     /// What M62 or M63 do to that with the next motion.
     then_enabled: Option<bool>,
+    /// It was held off during a cut: after that there is no arc until it is switched on anew.
+    gone_out: bool,
+    /// Height control runs, as above.
+    follows: bool,
+    then_follows: Option<bool>,
     /// Part of the feed that M67 or M68 leave.
     part: f64,
     /// What M67 makes of it with the next motion.
     then_part: Option<f64>,
     /// Feed of the material that is loaded: 0 before there is one, none where only the table knows it.
     pub material_feed: Option<f64>,
+    /// That feed, where the reader knows it.
+    table_feed: Option<f64>,
+    /// The table was told to change to another material, and not waited for.
+    pub changing: bool,
     /// Height over the sheet, mm, as far as it is known.
     z: Option<f64>,
     /// A probe has found the sheet since Z was last named: Z words are not heights over it.
@@ -41,24 +50,28 @@ pub(super) struct Torch {
     moved: bool,
 }
 
-impl Default for Torch {
-    fn default() -> Self {
+impl Torch {
+    /// Before a job; `table_feed` as for [`super::read_with`].
+    pub fn new(table_feed: Option<f64>) -> Self {
         Self {
             pierced: None,
             enabled: true,
             then_enabled: None,
+            gone_out: false,
+            follows: true,
+            then_follows: None,
             part: 1.0,
             then_part: None,
             material_feed: Some(0.0),
+            table_feed,
+            changing: false,
             z: None,
             probed: false,
             cut_z: None,
             moved: false,
         }
     }
-}
 
-impl Torch {
     /// The feed that velocity reduction leaves.
     pub fn slowed(&self, feed: f64) -> f64 {
         feed * self.part
@@ -87,7 +100,7 @@ impl State {
     /// A material that the job brings: `(o=0, …)`.
     pub(super) fn material(&mut self, line: usize, inside: &str, program: &mut Program) {
         match material_feed(inside) {
-            Ok(feed) => self.torch.material_feed = Some(feed),
+            Ok(feed) => (self.torch.material_feed, self.torch.changing) = (Some(feed), false),
             Err(problem) => program
                 .findings
                 .push(Finding::at(line, Rule::Syntax, problem)),
@@ -103,14 +116,30 @@ impl State {
     ) {
         if block.material {
             match block.p {
-                // Which feed that is only the table knows.
-                Some(_) => self.torch.material_feed = None,
+                Some(p) if p >= 0.0 && p.fract() == 0.0 && p <= f64::from(u32::MAX) => {
+                    // Which feed that is only the table knows.
+                    self.torch.material_feed = self.torch.table_feed;
+                    self.torch.changing = true;
+                    program.materials.push((line, p as u32));
+                }
+                Some(p) => program.findings.push(Finding::at(
+                    line,
+                    Rule::Syntax,
+                    format!(
+                        "M190 P{}: QtPlasmaC numbers its materials 0, 1, 2, …",
+                        short(p, 3)
+                    ),
+                )),
                 None => program.findings.push(Finding::at(
                     line,
                     Rule::Syntax,
                     "M190 without P: which material?".into(),
                 )),
             }
+        }
+        // Input 3, until it is on, for at most Q seconds.
+        if block.waits && (block.p, block.l) == (Some(3.0), Some(3.0)) && block.q > Some(0.0) {
+            self.torch.changing = false;
         }
         if let Some(output) = block.output {
             self.output(line, output, block, program);
@@ -165,6 +194,9 @@ impl State {
         if let Some(part) = self.torch.then_part.take() {
             self.torch.part = part;
         }
+        if let Some(follows) = self.torch.then_follows.take() {
+            self.torch.follows = follows;
+        }
         let on = self.beam == Beam::Torch && self.torch.enabled;
         let rapid = self.motion == Some(Motion::Rapid);
         let mut say = |rule, text: String| program.findings.push(Finding::at(line, rule, text));
@@ -176,6 +208,17 @@ impl State {
                     _ => "a rapid with the torch on".into(),
                 },
             );
+        }
+        if self.beam == Beam::Torch {
+            if on && self.torch.gone_out {
+                say(
+                    Rule::StandingBeam,
+                    "the torch, held off during this cut, may burn again: there is no arc, or one that pierces in motion; switch it off and on (M5, M3)"
+                        .into(),
+                );
+            }
+            // Once is enough.
+            self.torch.gone_out = !on;
         }
         // Without QtPlasmaC nobody but the job knows the height.
         if self.dialect != Dialect::QtPlasmaC {
@@ -239,7 +282,7 @@ impl State {
                 });
             }
             self.beam = Beam::Off;
-            self.torch.moved = false;
+            (self.torch.moved, self.torch.gone_out) = (false, false);
             return;
         }
         if self.beam != Beam::Off {
@@ -320,7 +363,8 @@ impl State {
             Output::Digital { on, with_motion } => match block.p {
                 Some(TORCH_OFF) if with_motion => self.torch.then_enabled = Some(!on),
                 Some(TORCH_OFF) => self.torch.enabled = !on,
-                Some(HEIGHT) => {}
+                Some(HEIGHT) if with_motion => self.torch.then_follows = Some(!on),
+                Some(HEIGHT) => self.torch.follows = !on,
                 _ => say(
                     Rule::Syntax,
                     "an output of which it is not known here what it does: P2 is height control, P3 the torch".into(),
@@ -343,8 +387,37 @@ impl State {
                 if with_motion {
                     self.torch.then_part = Some(part);
                 } else {
-                    (self.torch.part, self.torch.then_part) = (part, None);
+                    self.torch.part = part;
                 }
+            }
+        }
+    }
+
+    /// Outputs outlive the program that set them.
+    pub(super) fn left_behind(&self, line: usize, program: &mut Program) {
+        let torch = &self.torch;
+        for (wrong, text) in [
+            (
+                !torch.enabled,
+                "the program ends with the torch held off: the next job would not cut; M65 P3 belongs before the end",
+            ),
+            (
+                !torch.follows,
+                "the program ends with height control off: the next job would cut without; M65 P2 belongs before the end",
+            ),
+            (
+                torch.part != 1.0,
+                "the program ends with the speed lowered: the next job would be as slow; M68 E3 Q0 belongs before the end",
+            ),
+            (
+                [torch.then_enabled, torch.then_follows] != [None; 2] || torch.then_part.is_some(),
+                "the program ends with an output that waits for a motion (M62, M63, M67): it would change in the next job",
+            ),
+        ] {
+            if wrong {
+                program
+                    .findings
+                    .push(Finding::at(line, Rule::Modes, text.into()));
             }
         }
     }

@@ -43,13 +43,53 @@ fn qtplasmac_takes_feed_from_its_material_and_slows_with_the_motion() {
 #[test]
 fn a_torch_that_an_output_holds_off_burns_nothing() {
     let text = format!(
-        "{HEAD}F900\nM3 $0 S1\nG1 X1\nM62 P3\nX2\nM63 P3\nX3\nM64 P3\nM65 P3\nM62 P2\nX4\nM5\nM2\n"
+        "{HEAD}F900\nM3 $0 S1\nG1 X1\nM62 P3\nX2\nM5 $0\nM63 P3\nG0 X2.5\nM3 $0 S1\nG1 X3\nM64 P3\nM65 P3\nM62 P2\nX4\nM5\nM65 P2\nM2\n"
     );
     let ends: Vec<f64> = burnt(&text, Dialect::QtPlasmaC)
         .iter()
         .map(|b| b.0)
         .collect();
     assert_eq!(ends, [1.0, 3.0, 4.0]);
+}
+
+#[test]
+fn what_goes_with_a_motion_waits_for_it_and_outlives_the_program_if_nobody_takes_it_back() {
+    let cut = "F900\nM3 $0 S1\nG1 X1";
+    for (body, rule) in [
+        // Let go again in the same cut: no arc is there to go on with.
+        (
+            format!("{cut}\nM62 P3\nX2\nM63 P3\nX3\nM5"),
+            Some((9, Rule::StandingBeam)),
+        ),
+        (
+            format!("{cut}\nM62 P3\nX2\nM65 P3\nX3\nM5"),
+            Some((9, Rule::StandingBeam)),
+        ),
+        (format!("{cut}\nM62 P3\nX2\nM5\nM63 P3\nG0 X3"), None),
+        (format!("{cut}\nM62 P3\nX2\nM5\nM65 P3\nG0 X3"), None),
+        // No motion follows.
+        (
+            format!("{cut}\nM62 P3\nX2\nM5\nM63 P3"),
+            Some((10, Rule::Modes)),
+        ),
+        (format!("{cut}\nM67 E3 Q50\nM5"), Some((8, Rule::Modes))),
+        (format!("{cut}\nM67 E3 Q50\nX2\nM5"), Some((9, Rule::Modes))),
+        (format!("{cut}\nM62 P2\nX2\nM5"), Some((9, Rule::Modes))),
+        (format!("{cut}\nM64 P2\nX2\nM63 P2\nX3\nM5"), None),
+        (format!("{cut}\nM64 P3\nM5"), Some((8, Rule::Modes))),
+        // At once does not undo what waits.
+        (
+            format!("{cut}\nM67 E3 Q50\nM68 E3 Q0\nX2\nM5"),
+            Some((10, Rule::Modes)),
+        ),
+    ] {
+        let mut found = rules(&format!("{HEAD}{body}\nM2\n"), Dialect::QtPlasmaC);
+        // One that waits is one that is not yet done: both are told.
+        found.dedup();
+        assert_eq!(found, rule.into_iter().collect::<Vec<_>>(), "{body}");
+    }
+    let text = format!("%\n{HEAD}{cut}\nM62 P2\nX2\nM5\n%\n");
+    assert_eq!(rules(&text, Dialect::QtPlasmaC), [(10, Rule::Modes)]);
 }
 
 #[test]

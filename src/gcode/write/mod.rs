@@ -230,6 +230,9 @@ fn feed_word(cut: &Cut, speed_percent: f64) -> String {
 /// How the header names the machine profile that a job was written for.
 const MACHINE_LINE: &str = "machine ";
 
+/// How it names the material profile.
+const MATERIAL_LINE: &str = "material ";
+
 /// How the header says how often each cut is gone over; left out for once.
 const PASSES_LINE: &str = "passes ";
 
@@ -302,6 +305,13 @@ pub fn machine_of(text: &str) -> Option<&str> {
         .map(str::trim)
 }
 
+/// The name of the material profile that a job was written for, likewise.
+pub(super) fn material_of(text: &str) -> Option<&str> {
+    header(text)
+        .find_map(|line| line.strip_prefix(MATERIAL_LINE))
+        .map(str::trim)
+}
+
 /// The G-code of a toolpath, in machine coordinates, ending with a line end, in the dialect that the machine's profile
 /// asks for: GRBL and its successors for lasers, QtPlasmaC, or the profile's template for other plasma tables.
 ///
@@ -336,7 +346,7 @@ pub fn write(
             }
             let setting = material.cut_for(machine)?;
             match torch.height_control {
-                HeightControl::QtPlasmaC => linuxcnc::write(w, toolpath, material, &setting),
+                HeightControl::QtPlasmaC => linuxcnc::write(w, toolpath, torch, material, &setting),
                 HeightControl::Plain => template::write(w, toolpath, torch, &setting),
             }
         }
@@ -353,7 +363,7 @@ impl Writer<'_> {
         let figures = toolpath.figures();
         self.remark(&format!("kagome {}", env!("CARGO_PKG_VERSION")));
         self.remark(&format!("{MACHINE_LINE}{}", self.machine.name));
-        self.remark(&format!("material {}", material.name));
+        self.remark(&format!("{MATERIAL_LINE}{}", material.name));
         // The verifier must not guess this from what is burnt: a job that is doubled by mistake would pass.
         let passes = toolpath.passes;
         if passes > 1 {

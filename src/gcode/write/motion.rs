@@ -64,6 +64,8 @@ pub(super) struct Stroke {
     pub arc: Option<(Spot, bool)>,
     /// Per cent of the cut's speed.
     pub speed_percent: f64,
+    /// The torch is held off.
+    pub off: bool,
 }
 
 /// The strokes of a cut that begins at `start`. Each begins where the one before it ends, and none ends where it begins.
@@ -78,12 +80,14 @@ pub(super) fn strokes(
         done: Vec::with_capacity(steps.len()),
         pending: vec![point(start)],
         speed_percent: 100.0,
+        off: false,
         shortest_mm: 0.0,
     };
     for step in steps {
-        if step.speed_percent != maker.speed_percent || maker.shortest_mm == 0.0 {
+        let same = step.speed_percent == maker.speed_percent && step.off == maker.off;
+        if !same || maker.shortest_mm == 0.0 {
             maker.flush();
-            maker.speed_percent = step.speed_percent;
+            (maker.speed_percent, maker.off) = (step.speed_percent, step.off);
             let feed = feed_mm_per_min * step.speed_percent / 100.0;
             maker.shortest_mm = feed / 60.0 / rules.lines_per_s;
         }
@@ -99,6 +103,7 @@ struct Maker {
     /// Corners that are not yet written, the first being where the head is.
     pending: Vec<Point>,
     speed_percent: f64,
+    off: bool,
     shortest_mm: f64,
 }
 
@@ -155,6 +160,7 @@ impl Maker {
                     to,
                     arc: None,
                     speed_percent: self.speed_percent,
+                    off: self.off,
                 });
             }
             i = j;
@@ -205,6 +211,7 @@ impl Maker {
             to,
             arc: Some((about, clockwise)),
             speed_percent: self.speed_percent,
+            off: self.off,
         })
     }
 }
@@ -243,6 +250,7 @@ mod tests {
         Step {
             piece,
             speed_percent: 100.0,
+            off: false,
         }
     }
 
