@@ -4,7 +4,7 @@
 //! - [`repair`]: triangles into a surface: mended where that needs no guess, refused with place and remedy elsewhere;
 //! - [`samples`]: surfaces made here, by name;
 //! - [`closest`]: the closest point on a surface; [`edit`]: a point made a vertex, slits;
-//! - [`skirt`]: a strip beyond the rims, for patterns cut along a smooth one;
+//! - [`mod@skirt`]: a strip beyond the rims, for patterns cut along a smooth one;
 //! - [`body`]: a solid body below a surface, to form over;
 //! - [`check`]: figures for people; [`mod@write`]: OBJ text.
 //!
