@@ -1,4 +1,4 @@
-//! Which ends lie near which, and a first order from nearest to nearest.
+//! Which ends lie near which.
 
 use std::f64::consts::TAU;
 
@@ -37,14 +37,8 @@ impl Near {
         &self.ends[a..b]
     }
 
-    /// The lists of all ends, the start's last (the place `2 · strokes`), and the order of strokes by nearest
-    /// neighbour: the end at which each is entered.
-    pub(super) fn find(
-        ends: &[[Point; 2]],
-        start: Point,
-        returns: bool,
-        heat: Heat,
-    ) -> (Self, Vec<u32>) {
+    /// The lists of all ends, the start's last (the place `2 · strokes`).
+    pub(super) fn find(ends: &[[Point; 2]], start: Point, returns: bool, heat: Heat) -> Self {
         let all: Vec<Located> = ends
             .iter()
             .enumerate()
@@ -52,7 +46,7 @@ impl Near {
                 [0, 1].map(|k| Located::new([e[k].x, e[k].y], 2 * i as u32 + k as u32))
             })
             .collect();
-        let mut tree = RTree::bulk_load(all.clone());
+        let tree = RTree::bulk_load(all.clone());
         let mut near = Self {
             ends: Vec::with_capacity(KEPT * (all.len() + 1)),
             from: vec![0],
@@ -101,17 +95,6 @@ impl Near {
             near.ends.extend_from_slice(&list);
             near.from.push(near.ends.len() as u32);
         }
-        let mut first = Vec::with_capacity(ends.len());
-        let mut at = start;
-        while let Some(next) = tree.nearest_neighbor([at.x, at.y]).map(|e| e.data) {
-            let stroke = next as usize / 2;
-            for k in [0, 1] {
-                tree.remove(&all[2 * stroke + k]);
-            }
-            first.push(next);
-            let other = usize::from(next % 2 == 0) ^ usize::from(returns);
-            at = ends[stroke][other];
-        }
-        (near, first)
+        near
     }
 }

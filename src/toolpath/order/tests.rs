@@ -88,7 +88,7 @@ fn shortest(ends: &[[Point; 2]], start: Point, returns: bool) -> f64 {
 }
 
 #[test]
-fn every_stroke_comes_once_and_never_worse_than_nearest_neighbour() {
+fn every_stroke_comes_once_and_the_first_tour_is_never_better() {
     for n in [0, 1, 2, 3, 4, 7, 8, 9, 60, 400] {
         for returns in [false, true] {
             for heat in HEATS {
@@ -174,6 +174,16 @@ fn strokes_in_one_place_or_of_no_length_are_ordered_too() {
             assert_eq!(order.len(), 50);
             assert_eq!(travel(&ends, &order, Point::ZERO, returns), 5.0);
         }
+    }
+}
+
+#[test]
+fn places_that_are_no_numbers_leave_the_order_as_given() {
+    for bad in [f64::NAN, f64::INFINITY] {
+        let mut ends = strokes(20, 3);
+        ends[7][1].y = bad;
+        let order = order_strokes(&ends, Point::ZERO, false, Heat::NONE);
+        assert_eq!(order, (0..20).map(|s| (s, false)).collect::<Vec<_>>());
     }
 }
 
