@@ -5,8 +5,7 @@ use std::ops::Range;
 
 use kurbo::Point;
 
-use super::coverage::{Index, Pieces, Segment};
-use super::ligament::distance;
+use super::coverage::{Index, Pieces, Segment, distance};
 use super::verify::{Finding, Rule, TOLERANCE_MM, place};
 use super::write::Declared;
 use crate::base::curve::Curve;
