@@ -15,7 +15,7 @@ use kagome::linkage::{Handedness, Linkage};
 use kagome::machine::{self, Machine};
 use kagome::material::{self, CutSetting, Material};
 use kagome::pattern::{self, Sheet, SheetOptions};
-use kagome::toolpath::{self, Heat, Toolpath};
+use kagome::toolpath::{self, Heat, Toolpath, Way};
 use kurbo::Point;
 
 fn main() {
@@ -116,7 +116,7 @@ fn strokes(n: usize) -> Vec<[Point; 2]> {
 #[divan::bench(args = STROKES, sample_count = 5, max_time = MAX_TIME_S)]
 fn order(bencher: divan::Bencher<'_, '_>, n: usize) {
     let ends = strokes(n);
-    bencher.bench(|| toolpath::order_strokes(&ends, Point::ZERO, false, Heat::NONE));
+    bencher.bench(|| toolpath::order_strokes(&ends, Point::ZERO, Way::Either, Heat::NONE));
 }
 
 #[divan::bench(args = STROKES, sample_count = 5, max_time = MAX_TIME_S)]
@@ -126,7 +126,7 @@ fn order_cool(bencher: divan::Bencher<'_, '_>, n: usize) {
         price_mm: 20.0,
         reach_mm: 20.0,
     };
-    bencher.bench(|| toolpath::order_strokes(&ends, Point::ZERO, false, heat));
+    bencher.bench(|| toolpath::order_strokes(&ends, Point::ZERO, Way::Either, heat));
 }
 
 #[divan::bench(args = RADII, sample_count = 5, max_time = MAX_TIME_S)]

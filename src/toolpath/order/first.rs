@@ -19,8 +19,8 @@ pub(super) type Link = (f64, End, End);
 
 /// The ring of strokes, the last of them the depot, each by the end at which it is entered. `points` are the places of
 /// all ends, two a stroke, and `near` the links to make first. The depot's second end is never linked but to close
-/// the ring.
-pub(super) fn greedy(points: &[Point], near: Vec<Link>) -> Vec<End> {
+/// the ring. With `forwards`, a stroke's second end, and the depot's first, is linked to a first end only.
+pub(super) fn greedy(points: &[Point], near: Vec<Link>, forwards: bool) -> Vec<End> {
     let mut pieces = Pieces::new(points.len() as u32);
     pieces.join_cheapest(near);
     let nowhere = points.len() as u32 - 1;
@@ -37,9 +37,11 @@ pub(super) fn greedy(points: &[Point], near: Vec<Link>) -> Vec<End> {
         let mut links = Vec::with_capacity(LOOKED_AT * free.len());
         for end in &free {
             let far = pieces.far[end.data as usize];
+            let entered = |e: End| e.is_multiple_of(2) && e + 1 != nowhere;
+            let fits = |e: End| !forwards || entered(e) != entered(end.data);
             links.extend(
                 tree.nearest_neighbor_iter_with_distance_2(*end.geom())
-                    .filter(|(e, _)| e.data != end.data && e.data != far)
+                    .filter(|(e, _)| e.data != end.data && e.data != far && fits(e.data))
                     .take(LOOKED_AT)
                     .map(|(e, d2)| (d2.sqrt(), end.data, e.data)),
             );

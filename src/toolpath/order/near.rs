@@ -6,6 +6,7 @@ use kurbo::{Point, Vec2};
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
+use super::Way;
 use super::heat::Heat;
 
 /// Ends kept for each end, the nearest first; with returns half of them are at the end that a stroke does not begin at.
@@ -38,7 +39,7 @@ impl Near {
     }
 
     /// The lists of all ends, the start's last (the place `2 · strokes`).
-    pub(super) fn find(ends: &[[Point; 2]], start: Point, returns: bool, heat: Heat) -> Self {
+    pub(super) fn find(ends: &[[Point; 2]], start: Point, way: Way, heat: Heat) -> Self {
         let all: Vec<Located> = ends
             .iter()
             .enumerate()
@@ -51,7 +52,7 @@ impl Near {
             ends: Vec::with_capacity(KEPT * (all.len() + 1)),
             from: vec![0],
         };
-        let kept = if returns { 2 * KEPT } else { KEPT };
+        let kept = if way == Way::Back { 2 * KEPT } else { KEPT };
         let heats = heat.counts();
         let mut list: Vec<(u32, f64)> = Vec::new();
         for end in all
@@ -59,6 +60,9 @@ impl Near {
             .chain([&Located::new([start.x, start.y], u32::MAX)])
         {
             list.clear();
+            // One way, what is left links to what is entered; the start is left.
+            let entered = end.data < u32::MAX && end.data.is_multiple_of(2);
+            let fits = |other: u32| way != Way::Forwards || other.is_multiple_of(2) != entered;
             let here = ends.get(end.data as usize / 2);
             let cost = |other: u32, d2: f64| {
                 let hot = match (heats, here) {
@@ -70,7 +74,7 @@ impl Near {
             let nearest = if heats { NEAREST_OF_THEM } else { kept };
             list.extend(
                 tree.nearest_neighbor_iter_with_distance_2(*end.geom())
-                    .filter(|(e, _)| e.data / 2 != end.data / 2)
+                    .filter(|(e, _)| e.data / 2 != end.data / 2 && fits(e.data))
                     .take(nearest)
                     .map(|(e, d2)| cost(e.data, d2)),
             );
@@ -82,6 +86,7 @@ impl Near {
                         let there = radius * heat.reach_mm * Vec2::from_angle(angle);
                         if let Some(e) = tree.nearest_neighbor([x + there.x, y + there.y])
                             && e.data / 2 != end.data / 2
+                            && fits(e.data)
                         {
                             let [ex, ey] = *e.geom();
                             list.push(cost(e.data, (ex - x).powi(2) + (ey - y).powi(2)));

@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 
 use kurbo::Point;
 
+use super::Way;
 use super::first::{Link, greedy};
 use super::heat::{Heat, LOOKBACK};
 use super::near::Near;
@@ -125,16 +126,21 @@ fn links(near: &Near, start: End, returns: bool) -> Vec<Link> {
 
 impl<'a> Tour<'a> {
     /// A first tour: the cheapest links first.
-    pub(super) fn new(ends: &'a [[Point; 2]], start: Point, returns: bool, heat: Heat) -> Self {
+    pub(super) fn new(ends: &'a [[Point; 2]], start: Point, way: Way, heat: Heat) -> Self {
         let n = ends.len();
-        let near = Near::find(ends, start, returns, heat);
+        let returns = way == Way::Back;
+        let near = Near::find(ends, start, way, heat);
         let mut points: Vec<Point> = ends
             .iter()
             .flat_map(|e| if returns { [e[0]; 2] } else { *e })
             .collect();
         // Entered at the end that is nowhere, left from the start.
         points.extend([start, start]);
-        let sequence = greedy(&points, links(&near, 2 * n as u32, returns));
+        let sequence = greedy(
+            &points,
+            links(&near, 2 * n as u32, returns),
+            way == Way::Forwards,
+        );
         let mut place = vec![0; n + 1];
         for (i, &o) in sequence.iter().enumerate() {
             place[o as usize / 2] = i as u32;
