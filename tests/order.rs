@@ -6,7 +6,7 @@
     reason = "helpers of tests fail by panicking"
 )]
 
-use kagome::toolpath::{Heat, Spacing, order_strokes, spacing};
+use kagome::toolpath::{Heat, Spacing, Way, order_strokes, spacing};
 use kurbo::Point;
 
 struct Set {
@@ -114,7 +114,7 @@ fn compare(sizes: std::ops::Range<usize>) {
     for (name, strokes, best) in records {
         let set = set(&name);
         assert_eq!(set.ends.len(), strokes);
-        let order = order_strokes(&set.ends, set.start, false, Heat::NONE);
+        let order = order_strokes(&set.ends, set.start, Way::Either, Heat::NONE);
         let ratio = travel(&set, &order) / best;
         println!(
             "{name}: {strokes} strokes, {:+.2} % of the best known",
@@ -147,7 +147,7 @@ fn a_price_of_heat_buys_distance_with_travel() {
             price_mm,
             reach_mm: 20.0,
         };
-        let order = order_strokes(&set.ends, set.start, false, heat);
+        let order = order_strokes(&set.ends, set.start, Way::Either, heat);
         let cuts: Vec<[Point; 2]> = order.iter().map(|&(s, _)| set.ends[s]).collect();
         (travel(&set, &order), spacing(&cuts).unwrap())
     };

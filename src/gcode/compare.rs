@@ -5,8 +5,7 @@ use std::ops::Range;
 
 use kurbo::Point;
 
-use super::coverage::{Index, Pieces, Segment};
-use super::ligament::distance;
+use super::coverage::{Index, Pieces, Segment, distance};
 use super::verify::{Finding, Rule, TOLERANCE_MM, place};
 use super::write::Declared;
 use crate::base::curve::Curve;
@@ -157,11 +156,29 @@ impl Wanted {
 
     /// The cuts that pass a point within the tolerance, one of several segments as often. `near` is scratch.
     pub fn at<'a>(&'a self, p: Point, near: &'a mut Vec<u32>) -> impl Iterator<Item = usize> + 'a {
+        self.around(p, near).map(|(cut, _)| cut)
+    }
+
+    /// The cut that passes a point most closely, if one passes within the tolerance. `near` is scratch.
+    pub fn closest(&self, p: Point, near: &mut Vec<u32>) -> Option<usize> {
+        let all = self.around(p, near);
+        all.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(cut, _)| cut)
+    }
+
+    /// The cuts that pass a point within the tolerance, and how far off.
+    fn around<'a>(
+        &'a self,
+        p: Point,
+        near: &'a mut Vec<u32>,
+    ) -> impl Iterator<Item = (usize, f64)> + 'a {
         let spot = Segment { a: p, b: p };
         self.index.near(&spot, TOLERANCE_MM, near);
         near.iter()
-            .filter(move |n| distance(&spot, &self.index.segment(**n)) <= TOLERANCE_MM)
-            .map(|n| self.owners[*n as usize] as usize)
+            .map(move |n| {
+                let cut = self.owners[*n as usize] as usize;
+                (cut, distance(&spot, &self.index.segment(*n)))
+            })
+            .filter(|(_, off)| *off <= TOLERANCE_MM)
     }
 }
 

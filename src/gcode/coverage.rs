@@ -7,6 +7,8 @@ use kurbo::{Point, Vec2};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
+use crate::base::plane;
+
 /// A directed segment; one of zero length is a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Segment {
@@ -89,6 +91,20 @@ fn cut(interval: Interval, offset: f64, slope: f64, low: f64, high: f64) -> Opti
     let (p, q) = ((low - offset) / slope, (high - offset) / slope);
     let (from, to) = (interval.0.max(p.min(q)), interval.1.min(p.max(q)));
     (from <= to).then_some((from, to))
+}
+
+/// Least distance between two segments.
+pub(super) fn distance(a: &Segment, b: &Segment) -> f64 {
+    let (u, v, w) = (a.b - a.a, b.b - b.a, b.a - a.a);
+    let across = u.cross(v);
+    if across != 0.0 {
+        let (s, t) = (w.cross(v) / across, w.cross(u) / across);
+        if (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t) {
+            return 0.0;
+        }
+    }
+    let to = |p: Point, s: &Segment| plane::from_segment(p, s.a, s.b);
+    to(a.a, b).min(to(a.b, b)).min(to(b.a, a)).min(to(b.b, a))
 }
 
 /// Segments by place.
@@ -256,7 +272,7 @@ mod tests {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             (seed >> 40) as f64 / (1u64 << 24) as f64 * 4.0
         };
-        let distance = |p: Point, s: &Segment| {
+        let from_point = |p: Point, s: &Segment| {
             let d = s.b - s.a;
             let t = ((p - s.a).dot(d) / d.hypot2()).clamp(0.0, 1.0);
             p.distance(s.a.lerp(s.b, t))
@@ -268,7 +284,7 @@ mod tests {
             for k in 0..=50 {
                 let t = s.length() * f64::from(k) / 50.0;
                 let inside = found.is_some_and(|f| f.0 - 1e-9 <= t && t <= f.1 + 1e-9);
-                let d = distance(s.at(t), &o);
+                let d = from_point(s.at(t), &o);
                 assert!(if inside {
                     d < 0.7 + 1e-6
                 } else {

@@ -8,6 +8,9 @@ mod compare;
 mod coverage;
 mod interpret;
 mod ligament;
+mod outside;
+mod pierce;
+mod rim_last;
 #[cfg(test)]
 mod round_trip;
 mod verify;

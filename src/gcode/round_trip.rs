@@ -456,6 +456,32 @@ fn a_doubled_job_is_not_taken_for_one_of_two_passes() {
     assert_eq!(passes_of(&text), Some(3));
 }
 
+/// Rims pass the slits that begin at them by half a kerf, which here is less than the tolerance.
+#[test]
+fn a_kerf_below_the_tolerance_confuses_no_slit_with_its_rim() {
+    let machine = machine::load(machine::DEFAULT).unwrap();
+    let material = material::load(material::DEFAULT).unwrap();
+    let linkage = patch_of(4.4, Handedness::Right, &BTreeSet::new());
+    for (hinge_mm, kerf_mm) in [(0.02, 0.01), (0.05, 0.015), (0.2, 0.005)] {
+        let mut setting = material.cut_for(&machine).unwrap();
+        setting.kerf_mm = kerf_mm;
+        let sheet = Sheet::new(&linkage, &SheetOptions::plain(hinge_mm, kerf_mm)).unwrap();
+        let (sheet, _) = placed(&sheet, &machine, false).unwrap();
+        let cut = CutOptions::of(&setting, &machine, None);
+        let toolpath = plan(&sheet, &cut, [0.0, 0.0]).unwrap();
+        let text = write(&toolpath, &machine, &material).unwrap();
+        assert_eq!(findings(&text, &machine, &sheet, 1), []);
+        // A rim that does come first is still found.
+        let mut early = toolpath.clone();
+        early.cuts.rotate_right(1);
+        assert_eq!(early.cuts[0].role, Role::Outer);
+        let text = write(&early, &machine, &material).unwrap();
+        let found = findings(&text, &machine, &sheet, 1);
+        let rules: Vec<Rule> = found.iter().map(|f| f.rule).collect();
+        assert_eq!(rules, [Rule::Order], "{hinge_mm} {kerf_mm}: {found:?}");
+    }
+}
+
 /// Every chord of the kerf's rounded corners is shorter than the gap that a controller may leave at the end of a stroke.
 #[test]
 fn a_missing_corner_of_short_pieces_is_found_as_one_gap() {

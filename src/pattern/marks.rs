@@ -43,6 +43,10 @@ const LARGEST_RING_MM: f64 = 2.0;
 /// Part of a hinge's width that stays free beside slits and contours.
 const BESIDE: f64 = 0.3;
 
+/// What stays free beside a narrow hinge's slits, millimetres: steps of a motor and the tolerance of a verdict are not
+/// taken for a mark that runs into a slit.
+const LEAST_BESIDE_MM: f64 = 0.1;
+
 /// Positions that are tried for a mark on either side of a triangle's centre.
 const STEPS: i32 = 24;
 
@@ -144,7 +148,7 @@ impl<'a> Marker<'a> {
     fn new(linkage: &'a Linkage, sheet: &Sheet) -> Self {
         let meta = &sheet.metadata;
         // What engraves is about as wide as what cuts.
-        let beside = BESIDE * meta.hinge_width_mm + 0.5 * meta.kerf_mm;
+        let beside = (BESIDE * meta.hinge_width_mm).max(LEAST_BESIDE_MM) + 0.5 * meta.kerf_mm;
         // Ligaments lie within the neck; wide tips reach beyond it.
         let tip = meta.tip.radius_mm(0.0);
         let around = if tip > 0.0 { tip + beside } else { 0.0 };

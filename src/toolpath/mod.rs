@@ -12,7 +12,7 @@ mod scrap;
 mod star;
 
 pub use kerf::{CHORD_ERROR_MM, outline, without_tabs};
-pub use order::{Heat, LOOKBACK, Spacing, order_strokes, spacing};
+pub use order::{Heat, LOOKBACK, Spacing, Way, order_strokes, spacing};
 pub use path::{
     CornerSlowdown, Cut, CutOptions, Figures, Role, SmallHoles, Step, Toolpath, ToolpathError, plan,
 };

@@ -2,9 +2,9 @@
 
 use kurbo::Point;
 
-use super::order::Heat;
+use super::order::{Heat, Way, order_strokes};
 use super::scrap::{Scrap, Side};
-use super::{kerf, order, star};
+use super::{kerf, star};
 use crate::base::curve::{Curve, Piece};
 use crate::machine::Machine;
 use crate::material::{CutSetting, MarkSetting, PassOrder};
@@ -652,8 +652,7 @@ fn nearest<'a>(lines: impl Iterator<Item = &'a Curve>, head: Point) -> Option<us
     found.map(|(n, _)| n)
 }
 
-/// Lines in an order of short travel, each with whether it is reversed. A line with a wide pierce cannot be reversed: the
-/// tour goes through the pierces alone then, for a stroke is short beside the way to the next star.
+/// Lines in an order of short travel, each with whether it is reversed. A line with a wide pierce is not: it begins there.
 fn ordered(
     lines: &[Curve],
     head: Point,
@@ -661,18 +660,20 @@ fn ordered(
     pierce_mm: Option<f64>,
     heat: Heat,
 ) -> Vec<(usize, bool)> {
+    let pierced = pierce_mm.is_some();
     let ends: Vec<[Point; 2]> = lines
         .iter()
         .map(|line| {
             let (a, b) = (line.start().unwrap_or(head), line.end().unwrap_or(head));
-            if pierce_mm.is_some() { [a, a] } else { [a, b] }
+            if pierced && returns { [a, a] } else { [a, b] }
         })
         .collect();
-    let mut order = order::order_strokes(&ends, head, returns, heat);
-    if pierce_mm.is_some() {
-        order.iter_mut().for_each(|o| o.1 = false);
-    }
-    order
+    let way = match (pierced, returns) {
+        (true, _) => Way::Forwards,
+        (false, true) => Way::Back,
+        (false, false) => Way::Either,
+    };
+    order_strokes(&ends, head, way, heat)
 }
 
 #[cfg(test)]

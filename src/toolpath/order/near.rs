@@ -1,4 +1,4 @@
-//! Which ends lie near which, and a first order from nearest to nearest.
+//! Which ends lie near which.
 
 use std::f64::consts::TAU;
 
@@ -6,6 +6,7 @@ use kurbo::{Point, Vec2};
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
+use super::Way;
 use super::heat::Heat;
 
 /// Ends kept for each end, the nearest first; with returns half of them are at the end that a stroke does not begin at.
@@ -37,14 +38,8 @@ impl Near {
         &self.ends[a..b]
     }
 
-    /// The lists of all ends, the start's last (the place `2 · strokes`), and the order of strokes by nearest
-    /// neighbour: the end at which each is entered.
-    pub(super) fn find(
-        ends: &[[Point; 2]],
-        start: Point,
-        returns: bool,
-        heat: Heat,
-    ) -> (Self, Vec<u32>) {
+    /// The lists of all ends, the start's last (the place `2 · strokes`).
+    pub(super) fn find(ends: &[[Point; 2]], start: Point, way: Way, heat: Heat) -> Self {
         let all: Vec<Located> = ends
             .iter()
             .enumerate()
@@ -52,12 +47,12 @@ impl Near {
                 [0, 1].map(|k| Located::new([e[k].x, e[k].y], 2 * i as u32 + k as u32))
             })
             .collect();
-        let mut tree = RTree::bulk_load(all.clone());
+        let tree = RTree::bulk_load(all.clone());
         let mut near = Self {
             ends: Vec::with_capacity(KEPT * (all.len() + 1)),
             from: vec![0],
         };
-        let kept = if returns { 2 * KEPT } else { KEPT };
+        let kept = if way == Way::Back { 2 * KEPT } else { KEPT };
         let heats = heat.counts();
         let mut list: Vec<(u32, f64)> = Vec::new();
         for end in all
@@ -65,6 +60,9 @@ impl Near {
             .chain([&Located::new([start.x, start.y], u32::MAX)])
         {
             list.clear();
+            // One way, what is left links to what is entered; the start is left.
+            let entered = end.data < u32::MAX && end.data.is_multiple_of(2);
+            let fits = |other: u32| way != Way::Forwards || other.is_multiple_of(2) != entered;
             let here = ends.get(end.data as usize / 2);
             let cost = |other: u32, d2: f64| {
                 let hot = match (heats, here) {
@@ -76,7 +74,7 @@ impl Near {
             let nearest = if heats { NEAREST_OF_THEM } else { kept };
             list.extend(
                 tree.nearest_neighbor_iter_with_distance_2(*end.geom())
-                    .filter(|(e, _)| e.data / 2 != end.data / 2)
+                    .filter(|(e, _)| e.data / 2 != end.data / 2 && fits(e.data))
                     .take(nearest)
                     .map(|(e, d2)| cost(e.data, d2)),
             );
@@ -88,6 +86,7 @@ impl Near {
                         let there = radius * heat.reach_mm * Vec2::from_angle(angle);
                         if let Some(e) = tree.nearest_neighbor([x + there.x, y + there.y])
                             && e.data / 2 != end.data / 2
+                            && fits(e.data)
                         {
                             let [ex, ey] = *e.geom();
                             list.push(cost(e.data, (ex - x).powi(2) + (ey - y).powi(2)));
@@ -101,17 +100,6 @@ impl Near {
             near.ends.extend_from_slice(&list);
             near.from.push(near.ends.len() as u32);
         }
-        let mut first = Vec::with_capacity(ends.len());
-        let mut at = start;
-        while let Some(next) = tree.nearest_neighbor([at.x, at.y]).map(|e| e.data) {
-            let stroke = next as usize / 2;
-            for k in [0, 1] {
-                tree.remove(&all[2 * stroke + k]);
-            }
-            first.push(next);
-            let other = usize::from(next % 2 == 0) ^ usize::from(returns);
-            at = ends[stroke][other];
-        }
-        (near, first)
+        near
     }
 }

@@ -8,6 +8,8 @@ use std::collections::VecDeque;
 
 use kurbo::Point;
 
+use super::Way;
+use super::first::{Link, greedy};
 use super::heat::{Heat, LOOKBACK};
 use super::near::Near;
 
@@ -16,9 +18,13 @@ const BREADTH: [usize; 2] = [6, 4];
 /// A kick begins at three places that random walks of so many steps, each to a near end, lead to.
 const WALK: usize = 8;
 /// A kick exchanges two neighbouring pieces of the tour, together no longer than this.
-const KICK_SPAN: usize = 1000;
-/// Repairs of a kick turn no piece longer than this: turning longer ones costs more time than it saves travel.
-const KICK_REACH: usize = 1000;
+const KICK_SPAN: usize = 500;
+/// A kick begins at one of so many strokes that follow each other along the curve.
+const WINDOW: usize = 1000;
+/// So often kicks go along the whole curve.
+const PASSES: usize = 5;
+/// No piece longer than this is turned: turning longer ones costs more time than it saves travel.
+const REACH: usize = 10_000;
 /// Gains below this are rounding, millimetres.
 const EPSILON: f64 = 1e-9;
 
@@ -70,8 +76,8 @@ pub(super) struct Tour<'a> {
     near: Near,
     queue: VecDeque<u32>,
     queued: Vec<bool>,
-    /// Longest piece that may be turned.
-    reach: usize,
+    /// Whether changes may be taken back.
+    kicking: bool,
     /// Changes since the last kick, to take them back.
     log: Vec<Change>,
 }
@@ -82,27 +88,62 @@ enum Change {
     Chosen(u32),
 }
 
+/// How many places on a ring of `len` one place is ahead of another.
+#[inline]
+fn ahead(from: usize, to: usize, len: usize) -> usize {
+    if to >= from {
+        to - from
+    } else {
+        to + len - from
+    }
+}
+
+/// The place on a ring of `len` that is `by`, less than `len`, places ahead.
+#[inline]
+fn moved(from: usize, by: usize, len: usize) -> usize {
+    let to = from + by;
+    if to >= len { to - len } else { to }
+}
+
+/// Links to near neighbours, before any stroke was told by which end it begins: with returns, all begin at their first.
+fn links(near: &Near, start: End, returns: bool) -> Vec<Link> {
+    let mut links = Vec::new();
+    for a in 0..=start {
+        let few = near.of(a).take(BREADTH[0]);
+        if !returns {
+            links.extend(few.map(|(b, cost)| (cost, a, b)));
+        } else if a % 2 == 0 {
+            for (b, cost) in few.filter(|(b, _)| b % 2 == 0) {
+                links.extend([(cost, a, b), (cost, a, b ^ 1)]);
+                if a != start {
+                    links.extend([(cost, a ^ 1, b), (cost, a ^ 1, b ^ 1)]);
+                }
+            }
+        }
+    }
+    links
+}
+
 impl<'a> Tour<'a> {
-    /// A first tour: from nearest to nearest.
-    pub(super) fn new(ends: &'a [[Point; 2]], start: Point, returns: bool, heat: Heat) -> Self {
+    /// A first tour: the cheapest links first.
+    pub(super) fn new(ends: &'a [[Point; 2]], start: Point, way: Way, heat: Heat) -> Self {
         let n = ends.len();
-        let (near, first) = Near::find(ends, start, returns, heat);
-        let depot = n as u32;
-        let mut points: Vec<Point> = ends.iter().flatten().copied().collect();
-        let mut chosen = vec![0; n];
+        let returns = way == Way::Back;
+        let near = Near::find(ends, start, way, heat);
+        let mut points: Vec<Point> = ends
+            .iter()
+            .flat_map(|e| if returns { [e[0]; 2] } else { *e })
+            .collect();
         // Entered at the end that is nowhere, left from the start.
         points.extend([start, start]);
-        let mut sequence = Vec::with_capacity(n + 1);
-        sequence.push(2 * depot + 1);
-        sequence.extend(first);
+        let sequence = greedy(
+            &points,
+            links(&near, 2 * n as u32, returns),
+            way == Way::Forwards,
+        );
         let mut place = vec![0; n + 1];
         for (i, &o) in sequence.iter().enumerate() {
             place[o as usize / 2] = i as u32;
-            if returns && i > 0 {
-                let (s, end) = (o as usize / 2, o as usize % 2);
-                chosen[s] = end as u8;
-                points[2 * s + 1 - end] = points[2 * s + end];
-            }
         }
         Self {
             ends,
@@ -114,13 +155,13 @@ impl<'a> Tour<'a> {
                 .map(|[a, b]| (a.midpoint(*b), 0.5 * apart(*a, *b)))
                 .collect(),
             points,
-            chosen,
+            chosen: vec![0; n],
             queue: VecDeque::with_capacity(n + 1),
             queued: vec![false; n + 1],
             sequence,
             place,
             near,
-            reach: usize::MAX,
+            kicking: false,
             log: Vec::new(),
         }
     }
@@ -226,22 +267,19 @@ impl<'a> Tour<'a> {
         let breaks = &breaks[..links.len()];
         let depot = self.place[self.depot() as usize] as usize;
         // Whether place `p` is one of the `k` places after place `i`.
-        let within = |i: usize, k: usize, p: usize| {
-            let ahead = (p + len - i) % len;
-            ahead >= 1 && ahead <= k
-        };
+        let within = |i: usize, k: usize, p: usize| (1..=k).contains(&ahead(i, p, len));
         let mut sum = 0.0;
         for (m, &b) in breaks.iter().enumerate() {
             for k in 2..=LOOKBACK {
                 for before in 1..=k {
-                    let i = (b + len - before) % len;
+                    let i = moved(b, len - before, len);
                     if i == depot
                         || within(i, k, depot)
                         || breaks[..m].iter().any(|&other| within(i, k, other))
                     {
                         continue;
                     }
-                    let j = (i + k) % len;
+                    let j = moved(i, k, len);
                     sum += self.heat_between(self.sequence[i] / 2, self.sequence[j] / 2, k);
                 }
             }
@@ -251,22 +289,23 @@ impl<'a> Tour<'a> {
 
     /// Turns places `i..=j` of the ring, or all the others, which is the same ring.
     fn turn(&mut self, i: usize, j: usize) {
+        self.log.push(Change::Turned(i as u32, j as u32));
         let len = self.sequence.len();
-        let inside = (j + len - i) % len + 1;
+        let inside = ahead(i, j, len) + 1;
         let (mut a, mut b, count) = if 2 * inside <= len {
             (i, j, inside)
         } else {
-            ((j + 1) % len, (i + len - 1) % len, len - inside)
+            (moved(j, 1, len), moved(i, len - 1, len), len - inside)
         };
-        self.log.push(Change::Turned(i as u32, j as u32));
+        let (sequence, place) = (&mut self.sequence[..], &mut self.place[..]);
         for _ in 0..count.div_ceil(2) {
-            let (x, y) = (self.sequence[a] ^ 1, self.sequence[b] ^ 1);
-            self.sequence[a] = y;
-            self.sequence[b] = x;
-            self.place[y as usize / 2] = a as u32;
-            self.place[x as usize / 2] = b as u32;
-            a = if a + 1 == len { 0 } else { a + 1 };
-            b = if b == 0 { len - 1 } else { b - 1 };
+            let (x, y) = (sequence[a] ^ 1, sequence[b] ^ 1);
+            sequence[a] = y;
+            sequence[b] = x;
+            place[y as usize / 2] = a as u32;
+            place[x as usize / 2] = b as u32;
+            a = moved(a, 1, len);
+            b = moved(b, len - 1, len);
         }
     }
 
@@ -304,8 +343,7 @@ impl<'a> Tour<'a> {
             self.queued[stroke as usize] = false;
             while let Some(gain) = self.improve_at(stroke) {
                 gained += gain;
-                // Only a kick is taken back.
-                if self.reach == usize::MAX {
+                if !self.kicking {
                     self.log.clear();
                 }
             }
@@ -357,7 +395,7 @@ impl<'a> Tour<'a> {
 
     fn too_long(&self, p: usize, q: usize) -> bool {
         let apart = p.abs_diff(q);
-        apart.min(self.sequence.len() - apart) > self.reach
+        apart.min(self.sequence.len() - apart) > REACH
     }
 
     /// The exchange that begins with the link of `t1` and gains most; heat between strokes that are not neighbours in
@@ -417,7 +455,7 @@ impl<'a> Tour<'a> {
                     (false, true) => (p2, p3),
                     (false, false) => (p3, p2),
                 };
-                let span = (to + len - from) % len;
+                let span = ahead(from, to, len);
                 for (other, c45) in self.near.of(key(t4)).take(BREADTH[1]) {
                     let left = left - c45;
                     if left <= EPSILON {
@@ -435,7 +473,7 @@ impl<'a> Tour<'a> {
                         if self.too_long(p1, p5) {
                             continue;
                         }
-                        let inside = (p5 + len - from) % len <= span;
+                        let inside = ahead(from, p5, len) <= span;
                         let same = self.is_entry(t5) == self.is_entry(t4);
                         let kind = match (valid, inside) {
                             (true, _) if inside == same => Kind::TurnTwice,
@@ -513,28 +551,30 @@ impl<'a> Tour<'a> {
         }
     }
 
-    /// Three places in their order along the ring, close to each other on the sheet: where two short random walks from
-    /// near end to near end arrive, and where they began. None if they are more than `span` apart along the tour.
-    fn near_places(&self, random: &mut Random, span: usize) -> Option<[usize; 3]> {
+    /// Three places in their order along the ring, close to each other on the sheet: where a stroke is, and where two short
+    /// random walks from it, from near end to near end, arrive. None if they are more than `span` apart along the tour.
+    fn near_places(&self, random: &mut Random, stroke: usize, span: usize) -> Option<[usize; 3]> {
         let len = self.sequence.len();
-        let first = random.below(len);
+        let first = self.place[stroke] as usize;
         // Places ahead of the one `span` before the first.
-        let mut ahead = [span; 3];
-        for other in &mut ahead[1..] {
+        let mut places = [span; 3];
+        for other in &mut places[1..] {
             let mut end = self.sequence[first];
             for _ in 0..WALK {
                 let near = self.near.list(end);
                 let (next, _) = near.get(random.below(near.len()))?;
                 end = next ^ (random.below(2) as End);
             }
-            *other = (self.place[end as usize / 2] as usize + len + span - first) % len;
+            let there = self.place[end as usize / 2] as usize;
+            *other = moved(ahead(first, there, len), span, len);
         }
-        ahead.sort_unstable();
-        let [x, y, z] = ahead;
+        places.sort_unstable();
+        let [x, y, z] = places;
         if x == y || y == z || z - x > span {
             return None;
         }
-        Some(ahead.map(|p| (first + p + len - span) % len))
+        let from = moved(first, len - span, len);
+        Some(places.map(|p| moved(from, p, len)))
     }
 
     /// Exchanges two neighbouring pieces of the tour between random places that are near on the sheet (the double bridge
@@ -544,11 +584,15 @@ impl<'a> Tour<'a> {
         if len < 8 {
             return;
         }
-        self.reach = KICK_REACH;
+        self.kicking = true;
         let mut random = Random(0x9E37_79B9_7F4A_7C15);
         let span = KICK_SPAN.min(len - 2);
-        for _ in 0..times {
-            let Some([a, m, e]) = self.near_places(&mut random, span) else {
+        let window = WINDOW.min(len);
+        for n in 0..times {
+            // How far along the curve this pass has come, in strokes.
+            let come = (n * PASSES % times) as f64 / times as f64 * len as f64;
+            let stroke = (come as usize + random.below(window)) % len;
+            let Some([a, m, e]) = self.near_places(&mut random, stroke, span) else {
                 continue;
             };
             let entry = |tour: &Self, p: usize| tour.sequence[p];
@@ -574,7 +618,7 @@ impl<'a> Tour<'a> {
                 self.undo(0);
             }
         }
-        self.reach = usize::MAX;
+        self.kicking = false;
     }
 }
 
@@ -587,6 +631,7 @@ impl Random {
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 33) as usize) % n.max(1)
+        // A product instead of a remainder: no division.
+        (((self.0 >> 32) * n as u64) >> 32) as usize
     }
 }
