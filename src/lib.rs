@@ -22,6 +22,7 @@
 //! | [`gcode`] | cuts → text; text → what it burns, and a verdict |
 //! | [`control`] | job → controller over a transport, stopped with proof |
 //! | [`sim`] | a simulated GRBL laser that remembers what it burnt |
+//! | [`calibrate`] | readings of pulled strips → the σ that holds with a stated confidence; kerf from calipers |
 //! | [`job`] | all of it: design file, verdict, report |
 //! | [`cli`] | one file a verb; the program does nothing that the library cannot |
 //!
@@ -118,6 +119,8 @@ pub mod gcode;
 pub mod control;
 
 pub mod sim;
+
+pub mod calibrate;
 
 pub mod job;
 

@@ -7,6 +7,7 @@
 //! - [`progress`]: how long work reports and how it is interrupted, without knowing a terminal;
 //! - [`atomic`]: outputs that appear complete or not at all;
 //! - [`document`]: TOML that a person wrote, read strictly and blamed exactly;
+//! - [`random`]: seeded numbers for what is simulated;
 //! - [`sparse`]: symmetric positive definite systems, with the symbolic factor kept between solves;
 //! - [`starting`]: a profile of one's own from a shipped one, with an explanation of every key;
 //! - [`union`]: disjoint sets;
@@ -19,6 +20,7 @@ pub mod document;
 pub mod ids;
 pub mod plane;
 pub mod progress;
+pub mod random;
 pub mod sparse;
 pub mod starting;
 pub mod union;

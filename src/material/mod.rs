@@ -8,6 +8,7 @@
 mod cut;
 mod fit;
 mod profile;
+mod reading;
 mod shipped;
 mod start;
 
@@ -15,5 +16,6 @@ pub use cut::{CutEntry, EngraveEntry, Laser, PassOrder, Process};
 pub use fit::{CutError, CutSetting, Fit, MarkSetting, TorchSetting, classify};
 pub use profile::{Kind, Material, Sigma, Source, StockSize, Tip, TipShape};
 pub(crate) use profile::{check_format, check_name};
+pub use reading::{Failure, Reading, neck_mm};
 pub use shipped::{DEFAULT, load, own_file, own_files, parse, resolve, shipped};
 pub use start::start;

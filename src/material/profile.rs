@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::cut::{CutEntry, EngraveEntry, Process};
+use super::reading::Reading;
 use crate::base::document::{Complaint, ranged};
 
 /// What family a material belongs to.
@@ -45,6 +46,9 @@ pub struct Sigma {
     pub source: Source,
     /// From whom or how, in words.
     pub note: String,
+    /// The strips that were pulled, the oldest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sample: Vec<Reading>,
 }
 
 /// The form of a slit's end.
@@ -254,7 +258,11 @@ impl Material {
                 "is 1: a material that does not open at all makes no surface",
             ));
         }
-        check_note("sigma.note", self.sigma.source, &self.sigma.note)
+        check_note("sigma.note", self.sigma.source, &self.sigma.note)?;
+        for (i, sample) in self.sigma.sample.iter().enumerate() {
+            sample.check(&format!("sigma.sample[{i}]"))?;
+        }
+        Ok(())
     }
 
     fn check_cuts(&self) -> Result<(), Complaint> {

@@ -59,6 +59,16 @@ impl Ligament {
         }
     }
 
+    /// The ligaments beside a neck of `neck_mm`, with a tip of finished radius `tip_radius_mm`.
+    pub fn beside(width_mm: f64, tip_radius_mm: f64, neck_mm: f64, thickness_mm: f64) -> Self {
+        Self {
+            width_mm,
+            tip_radius_mm,
+            thickness_mm,
+            flank_mm: FLANK_IN_NECKS * neck_mm,
+        }
+    }
+
     /// How far it is bent at a stretch λ, radians: α = asin(λ/2) − 30°. Below 1 it is bent the other way.
     pub fn bend_at(opening: f64) -> f64 {
         (0.5 * opening.clamp(-2.0, 2.0)).asin() - std::f64::consts::FRAC_PI_6

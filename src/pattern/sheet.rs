@@ -404,7 +404,7 @@ impl SheetMetadata {
     /// h + k/2 + r from their centre lines: r is the tip's own, half a kerf the arm's, and h remains.
     pub fn neck_mm(&self) -> f64 {
         let tip = self.tip.radius_mm(self.kerf_mm);
-        (self.hinge_width_mm + 0.5 * self.kerf_mm + tip) / 0.75f64.sqrt()
+        crate::material::neck_mm(self.hinge_width_mm, self.kerf_mm, tip)
     }
 
     /// The largest finished radius of corners that leaves the ligaments alone: h + r.

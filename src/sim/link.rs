@@ -4,6 +4,7 @@ use std::io;
 use std::time::Duration;
 
 use super::controller::Controller;
+use crate::base::random::Random;
 use crate::control::Transport;
 
 /// What goes wrong with the line, on command. Counts are of bytes since the line was opened.
@@ -27,25 +28,6 @@ pub struct Faults {
     pub late_s: f64,
     /// Seed of that randomness.
     pub seed: u64,
-}
-
-/// SplitMix64: small, seeded, good enough to shake a protocol.
-#[derive(Clone, Debug)]
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    #[expect(clippy::cast_precision_loss, reason = "53 bits fit")]
-    fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
 }
 
 /// A [`Transport`] to a [`Controller`] in the same process, on the controller's virtual clock.
@@ -75,7 +57,7 @@ impl SimTransport {
     pub fn with_faults(controller: Controller, faults: Faults) -> Self {
         Self {
             controller,
-            random: Random(faults.seed),
+            random: Random::new(faults.seed),
             faults,
             sent: 0,
             received: 0,
@@ -195,7 +177,7 @@ impl Transport for SimTransport {
                 let mut count = self.waiting().min(buffer.len());
                 if self.faults.late_s > 0.0 && count > 1 {
                     #[expect(clippy::cast_possible_truncation, reason = "a remainder below count")]
-                    let piece = 1 + (self.random.next() % count as u64) as usize;
+                    let piece = 1 + (self.random.bits() % count as u64) as usize;
                     count = piece;
                 }
                 buffer[..count].copy_from_slice(&self.inbox[self.taken..self.taken + count]);
