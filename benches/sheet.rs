@@ -1,7 +1,7 @@
 //! From linkage to verified G-code: sheet, order of cuts, text, verdict, for about 10³, 10⁴, 10⁵ and 10⁶ slits. From size
 //! to size the time should grow little more than the number of slits does.
 //!
-//! The largest takes gigabytes and minutes; `cargo bench --bench sheet -- --skip 333 --skip 1000000` leaves it out.
+//! The largest takes minutes; `cargo bench --bench sheet -- --skip 333 --skip 1000000` leaves it out.
 
 #![expect(
     clippy::expect_used,
