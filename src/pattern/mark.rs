@@ -17,15 +17,18 @@ pub enum MarkKind {
     Name,
     /// Which side is outside.
     Side,
+    /// Where the stretch of a strip is read, or the scale for it.
+    Gauge,
 }
 
 impl MarkKind {
     /// All kinds with the names that drawings give them.
-    pub const ALL: [(Self, &'static str); 4] = [
+    pub const ALL: [(Self, &'static str); 5] = [
         (Self::Seam, "seam"),
         (Self::Cone, "cone"),
         (Self::Name, "name"),
         (Self::Side, "side"),
+        (Self::Gauge, "gauge"),
     ];
 }
 
