@@ -53,7 +53,10 @@ mod simulated;
 mod tests;
 
 pub use bound::{Bound, Caution, Demand, StoppedBy};
-pub use coupon::{Coupon, KerfPiece, SettingSquare, Strip};
+pub use coupon::{
+    Coupon, CouponError, CouponJob, CouponPlan, CouponWish, GAUGE_STEP, KerfPiece, MOST_STRIPS,
+    SettingSquare, Strip, coupon,
+};
 pub use fit::{Calibration, FitOptions, Limit, fit};
 pub use geometry::Geometry;
 pub use kerf::{Kerf, KerfError, KerfReading, Side, kerf};

@@ -368,7 +368,11 @@ pub(crate) fn stock<'a>(
         options: SheetOptions {
             hinge_width_mm: request.hinge_width_mm.unwrap_or(material.hinge_width_mm),
             kerf_mm: request.kerf_mm.unwrap_or(setting.kerf_mm),
-            tip: request.sheet.tip.unwrap_or_else(|| tip_of(material)),
+            tip: request
+                .sheet
+                .tip
+                .or(material.tip.map(Tip::from))
+                .unwrap_or_default(),
             corner_radius_mm: request
                 .sheet
                 .corner_radius_mm
@@ -386,18 +390,6 @@ pub(crate) fn stock<'a>(
     check_sizing(request.sizing)?;
     check_ranges(request.accept_distance, &stock)?;
     Ok(stock)
-}
-
-/// The shape of slits' tips that a material's profile asks for.
-fn tip_of(material: &Material) -> Tip {
-    let Some(tip) = material.tip else {
-        return Tip::Plain;
-    };
-    match (tip.shape, tip.radius_mm) {
-        (TipShape::Round, Some(radius_mm)) => Tip::Round { radius_mm },
-        (TipShape::Teardrop, Some(radius_mm)) => Tip::Teardrop { radius_mm },
-        _ => Tip::Plain,
-    }
 }
 
 /// What was decided about the shape of a sheet.

@@ -1,6 +1,6 @@
 //! From a linkage to the sheets that are cut: drawn, turned to fit, divided where they do not, and laid on the stock.
 
-use kurbo::{Point, Rect};
+use kurbo::Point;
 use nalgebra::Point2;
 
 use super::MakeError;
@@ -9,9 +9,6 @@ use super::request::{FlapWish, Request};
 use super::shape::Stock;
 use crate::linkage::{Built, Flaps, TriangleId};
 use crate::pattern::{self, MarkOptions, Motion, Nested, PatternError, Sheet, StockArea};
-
-/// Between two parts on one sheet, millimetres, besides four kerfs: room for leads, and for a person's fingers.
-const GAP_MM: f64 = 2.0;
 
 /// Where a linkage lies on its sheets.
 pub(crate) struct Sheets {
@@ -193,24 +190,8 @@ fn draw(
 }
 
 impl Stock<'_> {
-    /// Where parts may lie: the bed inside its margins, or the piece of stock in its corner.
+    /// Where parts may lie.
     pub fn area(&self) -> StockArea {
-        let reach = self.machine.reach();
-        let margin = self.machine.bed.margin_mm;
-        let mut free = Rect::new(
-            reach.min[0] + margin,
-            reach.min[1] + margin,
-            reach.max[0] - margin,
-            reach.max[1] - margin,
-        );
-        if let Some([width, height]) = self.stock_mm {
-            free.x1 = free.x1.min(reach.min[0] + width - margin);
-            free.y1 = free.y1.min(reach.min[1] + height - margin);
-        }
-        let kerf = self.options.kerf_mm;
-        StockArea {
-            free,
-            gap_mm: GAP_MM + 4.0 * kerf,
-        }
+        StockArea::of(self.machine, self.stock_mm, self.options.kerf_mm)
     }
 }

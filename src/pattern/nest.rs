@@ -10,6 +10,7 @@ use kurbo::{Point, Rect};
 use super::place::Motion;
 use super::sheet::{PatternError, Sheet, Slit};
 use crate::base::plane;
+use crate::machine::Machine;
 
 /// Cells along the longer side of the stock.
 const CELLS: f64 = 400.0;
@@ -26,6 +27,31 @@ pub struct StockArea {
     pub free: Rect,
     /// Between the finished edges of two parts.
     pub gap_mm: f64,
+}
+
+/// Between two parts on one sheet, millimetres, besides four kerfs: room for leads, and for a person's fingers.
+const GAP_MM: f64 = 2.0;
+
+impl StockArea {
+    /// The bed inside its margins, or the piece of stock in its corner (width and height, millimetres), for this kerf.
+    pub fn of(machine: &Machine, stock_mm: Option<[f64; 2]>, kerf_mm: f64) -> Self {
+        let reach = machine.reach();
+        let margin = machine.bed.margin_mm;
+        let mut free = Rect::new(
+            reach.min[0] + margin,
+            reach.min[1] + margin,
+            reach.max[0] - margin,
+            reach.max[1] - margin,
+        );
+        if let Some([width, height]) = stock_mm {
+            free.x1 = free.x1.min(reach.min[0] + width - margin);
+            free.y1 = free.y1.min(reach.min[1] + height - margin);
+        }
+        Self {
+            free,
+            gap_mm: GAP_MM + 4.0 * kerf_mm,
+        }
+    }
 }
 
 /// Where one part goes.

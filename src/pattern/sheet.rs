@@ -20,6 +20,7 @@ use crate::base::ids::{Id, Per};
 use crate::base::plane;
 use crate::base::union::Union;
 use crate::linkage::{Flaps, Linkage, Triangle, TriangleId};
+use crate::material::{self, TipShape};
 
 /// Largest neck c (the uncut end of a slit's lattice edge) in edge lengths.
 ///
@@ -83,6 +84,17 @@ pub enum Tip {
         /// The finished radius of its round end, millimetres.
         radius_mm: f64,
     },
+}
+
+impl From<material::Tip> for Tip {
+    /// As a profile that was checked has it.
+    fn from(tip: material::Tip) -> Self {
+        match (tip.shape, tip.radius_mm) {
+            (TipShape::Round, Some(radius_mm)) => Self::Round { radius_mm },
+            (TipShape::Teardrop, Some(radius_mm)) => Self::Teardrop { radius_mm },
+            _ => Self::Plain,
+        }
+    }
 }
 
 impl Tip {

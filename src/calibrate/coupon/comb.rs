@@ -15,17 +15,14 @@ const WALL_MM: f64 = 6.0;
 /// Squares for calipers, and the slot between them: width and height as they shall be, millimetres.
 const SQUARES_MM: [[f64; 2]; 3] = [[20.0, 20.0], [14.0, 14.0], [20.0, 5.0]];
 
-/// Squares of the setting grid, millimetres.
-const SETTING_MM: f64 = 8.0;
-
 /// Room for a name below each square, millimetres.
 const NAME_MM: f64 = 5.0;
 
 /// Height of names and numbers, millimetres.
 const TEXT_MM: f64 = 3.0;
 
-/// Ticks of the card, millimetres: between the numbers, and at them.
-const TICKS_MM: [f64; 2] = [3.0, 5.0];
+/// Ticks of the card, millimetres: at tenths, at halves of them, and between.
+const TICKS_MM: [f64; 3] = [5.0, 3.5, 2.0];
 
 /// Height of one scale on the card, millimetres.
 const SCALE_MM: f64 = 14.0;
@@ -92,14 +89,15 @@ pub(super) fn kerf_plate(shapes: &SheetOptions, engraved: bool) -> (Sheet, Vec<K
     (sheet, pieces)
 }
 
-/// The grid of settings: a square hole for each power (along X, rising) and speed (along Y, falling), and where each is.
+/// The grid of settings: a square hole with this side for each power (along X) and speed (downwards), and the middle of each.
 pub(super) fn setting_plate(
     powers: &[f64],
     speeds: &[f64],
+    side_mm: f64,
     shapes: &SheetOptions,
     engraved: bool,
 ) -> (Sheet, Vec<(SettingSquare, Point)>) {
-    let pitch = Vec2::new(SETTING_MM + WALL_MM, SETTING_MM + NAME_MM + 1.0);
+    let pitch = Vec2::new(side_mm + WALL_MM, side_mm + NAME_MM + 1.0);
     let rect = Rect::new(
         0.0,
         0.0,
@@ -115,11 +113,11 @@ pub(super) fn setting_plate(
                 rect.y1 - pitch.y * (row + 1) as f64 + NAME_MM - WALL_MM + 1.0,
             );
             sheet.contours.push(Contour {
-                line: rectangle(Rect::from_origin_size(at, (SETTING_MM, SETTING_MM)), false),
+                line: rectangle(Rect::from_origin_size(at, (side_mm, side_mm)), false),
                 outer: false,
             });
             let name = format!("P{}", squares.len() + 1);
-            let middle = at + Vec2::new(0.5, 0.5) * SETTING_MM;
+            let middle = at + Vec2::new(0.5, 0.5) * side_mm;
             if engraved {
                 let below = Point::new(middle.x, at.y - 0.5 * NAME_MM);
                 sheet.marks.push(label(&name, below, TEXT_MM));
@@ -158,12 +156,12 @@ pub(super) fn card(strips: &[Strip], step: f64, shapes: &SheetOptions) -> Sheet 
     for (n, &length) in lengths.iter().enumerate() {
         // Ticks hang from the upper edge of each scale.
         let top = rect.y1 - SCALE_MM * n as f64 - 1.5;
-        let mut lines = vec![tick(WALL_MM, top, TICKS_MM[1])];
-        for (stretch, numbered) in ticks(step) {
+        let mut lines = vec![tick(WALL_MM, top, TICKS_MM[0])];
+        for (stretch, rank) in ticks(step) {
             let x = WALL_MM + stretch * length;
-            lines.push(tick(x, top, TICKS_MM[usize::from(numbered)]));
-            if numbered {
-                let at = Point::new(x, top - TICKS_MM[1] - 0.8 - 0.4 * TEXT_MM);
+            lines.push(tick(x, top, TICKS_MM[rank]));
+            if rank == 0 {
+                let at = Point::new(x, top - TICKS_MM[0] - 0.8 - 0.4 * TEXT_MM);
                 sheet
                     .marks
                     .push(label(&format!("{stretch:.1}"), at, 0.8 * TEXT_MM));
@@ -183,7 +181,7 @@ pub(super) fn card(strips: &[Strip], step: f64, shapes: &SheetOptions) -> Sheet 
         let width = crate::pattern::width_mm(&text, 0.8 * TEXT_MM);
         let at = Point::new(
             (WALL_MM + 2.0 + 0.5 * width).min(0.5 * longest + WALL_MM),
-            top - TICKS_MM[1] - 0.8 - 0.4 * TEXT_MM,
+            top - TICKS_MM[0] - 0.8 - 0.4 * TEXT_MM,
         );
         sheet.marks.push(label(&text, at, 0.8 * TEXT_MM));
     }
@@ -194,14 +192,21 @@ fn tick(x: f64, top: f64, length: f64) -> Curve {
     Curve::line(Point::new(x, top), Point::new(x, top - length))
 }
 
-/// The stretches of a scale, and whether each has its number: from 1 to 2 in steps.
-pub(super) fn ticks(step: f64) -> Vec<(f64, bool)> {
+/// The stretches of a scale, from 1 to 2 in steps, and what each is: 0 a tenth, which has its number, 1 half of one, 2 other.
+pub(super) fn ticks(step: f64) -> Vec<(f64, usize)> {
     let count = (1.0 / step).round().max(1.0) as usize;
+    let whole = |v: f64| (v - v.round()).abs() < 1e-6;
     (0..=count)
         .map(|k| {
             let stretch = 1.0 + k as f64 * step;
-            let tenths = stretch * 10.0;
-            (stretch, (tenths - tenths.round()).abs() < 1e-6)
+            let rank = if whole(10.0 * stretch) {
+                0
+            } else if whole(20.0 * stretch) {
+                1
+            } else {
+                2
+            };
+            (stretch, rank)
         })
         .collect()
 }

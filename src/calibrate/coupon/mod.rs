@@ -5,11 +5,14 @@
 //! readings.
 
 mod comb;
+mod plan;
 mod strip;
 
 use serde::{Deserialize, Serialize};
 
 use super::kerf::Side;
+
+pub use plan::{CouponError, CouponJob, CouponPlan, CouponWish, GAUGE_STEP, MOST_STRIPS, coupon};
 
 /// What was cut: `coupon.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
