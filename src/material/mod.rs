@@ -16,6 +16,7 @@ pub use cut::{CutEntry, EngraveEntry, Laser, PassOrder, Process};
 pub use fit::{CutError, CutSetting, Fit, MarkSetting, TorchSetting, classify};
 pub use profile::{Kind, Material, Sigma, Source, StockSize, Tip, TipShape};
 pub(crate) use profile::{check_format, check_name};
+pub(crate) use reading::check_date;
 pub use reading::{Failure, Reading, neck_mm};
 pub use shipped::{DEFAULT, load, own_file, own_files, parse, resolve, shipped};
 pub use start::start;
