@@ -5,6 +5,7 @@
 //! where they come from: only a [`Source::Measured`] was measured. [`Material::cut_for`] gives the settings for one
 //! machine, every default filled in.
 
+mod amend;
 mod cut;
 mod fit;
 mod profile;
@@ -12,6 +13,7 @@ mod reading;
 mod shipped;
 mod start;
 
+pub use amend::{AmendError, Measured, MeasuredCut, amend};
 pub use cut::{CutEntry, EngraveEntry, Laser, PassOrder, Process};
 pub use fit::{CutError, CutSetting, Fit, MarkSetting, TorchSetting, classify};
 pub use profile::{Kind, Material, Sigma, Source, StockSize, Tip, TipShape};
