@@ -64,7 +64,10 @@ pub use fit::{Calibration, FitOptions, Limit, fit};
 pub use geometry::Geometry;
 pub use kerf::{Kerf, KerfError, KerfReading, Side, kerf};
 pub use next::{Candidate, NextStrip};
-pub use readings::{Doubt, MeasuredPiece, Readings, TriedSetting, template};
+pub(crate) use readings::{
+    Answer, Item, check_calipers, check_stretch, failure, items, number, pulled, yes,
+};
+pub use readings::{Doubt, MeasuredPiece, Readings, TriedSetting, not_counted_yet, template};
 pub use refusal::{Measure, Refusal};
 pub use scatter::{LAWS, Law};
 pub use simulated::{Gauge, SimulatedMaterial};

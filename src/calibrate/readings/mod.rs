@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 pub use doubt::Doubt;
 pub(crate) use merge::{Answer, Item, items};
-pub(crate) use words::{Wrong, check_calipers, failure, number, pulled, yes};
+pub(crate) use words::{check_calipers, check_stretch, failure, number, pulled, yes};
 
 use super::coupon::Coupon;
 use super::kerf::{Kerf, KerfError, KerfReading, Side, kerf};
@@ -206,6 +206,21 @@ impl Readings {
                 .then(b.speed_mm_per_min.total_cmp(&a.speed_mm_per_min))
         })
     }
+}
+
+/// Those of `new` that are not among `have` nor come twice: a strip is the same if its name, its day and all of its values
+/// are. The names of the others as well.
+pub fn not_counted_yet(have: &[Reading], new: &[Reading]) -> (Vec<Reading>, Vec<String>) {
+    let (mut fresh, mut known) = (Vec::<Reading>::new(), Vec::new());
+    for reading in new {
+        let same = |other: &Reading| reading.strip.is_some() && other == reading;
+        if have.iter().any(same) || fresh.iter().any(same) {
+            known.push(reading.strip.clone().unwrap_or_default());
+        } else {
+            fresh.push(reading.clone());
+        }
+    }
+    (fresh, known)
 }
 
 /// The CSV to fill in for a coupon.
