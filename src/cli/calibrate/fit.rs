@@ -65,8 +65,7 @@ pub(super) fn run(args: &FitArgs, global: &Global, terminal: &Terminal) -> Resul
     let (fresh, known) = not_counted_yet(&base.material.sigma.sample, &new);
     if !known.is_empty() {
         terminal.note(&format!(
-            "{} counted already, with the same day and values, and not once more: {}. If another coupon's strip of this name is meant, give it another name in its readings",
-            if known.len() == 1 { "is" } else { "are" },
+            "in the profile already with the same day and values, and counted once: {}. If strips of another coupon are meant, give them other names in their readings",
             known.join(", ")
         ));
     }
