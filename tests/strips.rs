@@ -213,14 +213,12 @@ fn what_cannot_be_is_refused_and_no_profile_is_touched() {
         assert!(said.contains(words), "{said}");
         assert!(!bench.path("own/profiles/few.toml").exists());
     }
-    // A sheet far from the strips: no, and which strip would tell.
+    // A sheet far from the strips: no, and which strips would tell.
     let said = bench.says(1, "calibrate fit coupon --edge 40");
-    assert!(said.contains("an edge of 40 mm"), "{said}");
-    let said = bench.says(1, "calibrate fit coupon --edge 20");
-    assert!(
-        said.contains("no σ") && said.contains("next: a strip"),
-        "{said}"
-    );
+    assert!(said.contains("Pull two or more strips of 40 mm"), "{said}");
+    // A little outside it is answered with care.
+    let said = bench.says(0, "calibrate fit coupon --edge 20 --name far");
+    assert!(said.contains("caution: an edge of 20 mm"), "{said}");
     for (line, words) in [
         ("calibrate fit coupon --confidence 2", "between 0.5"),
         ("calibrate fit coupon --material felt", "--material"),
