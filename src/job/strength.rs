@@ -187,7 +187,7 @@ pub struct HingeMargin {
     pub point: u32,
     /// How far it is open, λ.
     pub opening: f64,
-    /// The bound over that: below 1 it may fail with more than the allowed probability.
+    /// The bound for the widest hinge over that: below 1 it may fail with more than the allowed probability.
     pub margin: f64,
 }
 
@@ -274,7 +274,7 @@ impl Proof {
 
     fn claim(&self, proved: &Proved) -> String {
         format!(
-            "with a confidence of {}, {} strips allow {} hinges like these to open to {}",
+            "with a confidence of {}, {} strips allow the widest of {} hinges like these to open to {}",
             self.confidence,
             self.strips,
             proved.margins.len(),

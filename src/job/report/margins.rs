@@ -77,7 +77,7 @@ pub(super) fn margins(out: &mut String, page: &Page<'_>, pose: &Pose<'_>, around
         .collect();
     let _ = write!(
         out,
-        "<section><h2>Margins</h2><p class=\"lead\">How far each hinge is on its way from closed to {}, as far as all of them may open by the strips that were pulled, with a confidence of {}. A margin is this over the hinge's own opening.</p><div class=\"key\">{}</div><div class=\"grid\">{}</div><table><tr><th>place</th><th>open λ</th><th>margin</th></tr>{rows}</table><table><tr><th>hinges</th><th>margin</th></tr>{parts}</table></section>",
+        "<section><h2>Margins</h2><p class=\"lead\">How far each hinge is on its way from closed to {}. So far the widest may open, and the others in proportion, by the strips that were pulled and with a confidence of {}. A margin is this over the hinge's own opening; folds between triangles are not in it.</p><div class=\"key\">{}</div><div class=\"grid\">{}</div><table><tr><th>place</th><th>open λ</th><th>margin</th></tr>{rows}</table><table><tr><th>hinges</th><th>margin</th></tr>{parts}</table></section>",
         short(margins.bound, 3),
         margins.confidence,
         legend(&scale, "", "", "beyond what the strips allow"),
