@@ -65,7 +65,7 @@ impl Talk<'_> {
             match self.hear(question)? {
                 Typed::Words(text) => match read(&text) {
                     Ok(value) => return Ok(Ok(value)),
-                    Err(problem) => self.say(&format!("    That {problem}.\n"))?,
+                    Err(problem) => self.say(&format!("    That {problem}\n"))?,
                 },
                 other => return Ok(Err(other)),
             }
