@@ -128,7 +128,8 @@ impl Document {
         found
     }
 
-    fn blame(
+    /// The error of a problem at some bytes of the text.
+    pub(crate) fn blame(
         &self,
         key: Option<String>,
         problem: String,

@@ -4,6 +4,7 @@ use super::fit::{Calibration, SAME_THICKNESS, normal_nodes};
 use super::geometry::{Geometry, Scale};
 use super::refusal::{Measure, Refusal};
 use super::scatter::{LAWS, Law};
+use crate::base::units::short;
 
 /// The share of the allowed risk that the posterior may use. The rest is for what it does not know: the prior of the spread
 /// ends somewhere, the law of scatter is one of two, the gauge has marks. Measured: with all of it, cells with a Weibull
@@ -106,14 +107,13 @@ pub struct Caution {
 
 impl std::fmt::Display for Caution {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let asked = short(self.asked, 3);
         write!(
             f,
-            "{} of {} mm is outside of the strips, {} to {} mm: the bound was lowered for that; a strip of {} mm would tell",
+            "{} of {asked} mm is outside of the strips, {} to {} mm: the bound was lowered for that; a strip of {asked} mm would tell",
             self.what.words(),
-            self.asked,
-            self.low,
-            self.high,
-            self.asked
+            short(self.low, 3),
+            short(self.high, 3),
         )
     }
 }

@@ -38,6 +38,11 @@
 //! # Kerf
 //!
 //! [`kerf`](kerf()) takes caliper readings of pieces and holes.
+//!
+//! # Readings
+//!
+//! What a maker wrote down beside a [`Coupon`], as CSV or TOML, becomes [`Readings`], `readings.toml`: checked, with what
+//! looks wrong as [`Doubt`]s, and with the hinges as wide as they really are under the kerf that was measured.
 
 mod bound;
 mod coupon;
@@ -45,6 +50,7 @@ mod fit;
 mod geometry;
 mod kerf;
 mod next;
+mod readings;
 mod refusal;
 mod scatter;
 mod simulated;
@@ -61,6 +67,10 @@ pub use fit::{Calibration, FitOptions, Limit, fit};
 pub use geometry::Geometry;
 pub use kerf::{Kerf, KerfError, KerfReading, Side, kerf};
 pub use next::{Candidate, NextStrip};
+pub(crate) use readings::{
+    Answer, Item, check_calipers, check_stretch, failure, items, number, pulled, yes,
+};
+pub use readings::{Doubt, MeasuredPiece, Readings, TriedSetting, not_counted_yet, template};
 pub use refusal::{Measure, Refusal};
 pub use scatter::{LAWS, Law};
 pub use simulated::{Gauge, SimulatedMaterial};

@@ -1,5 +1,7 @@
 //! Why readings, or a question, cannot be answered, and what to do.
 
+use crate::base::units::short;
+
 /// Why there is no bound.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Refusal {
@@ -84,7 +86,7 @@ pub enum Refusal {
     },
     /// Measures that make no hinge.
     #[error(
-        "hinges of {hinge_width_mm} mm with a kerf of {kerf_mm} mm do not fit on edges of {edge_mm} mm"
+        "hinges of {} mm with a kerf of {} mm do not fit on edges of {} mm", short(*hinge_width_mm, 3), short(*kerf_mm, 3), short(*edge_mm, 3)
     )]
     Unsound {
         /// Width asked.
@@ -96,7 +98,7 @@ pub enum Refusal {
     },
     /// Far from all strips.
     #[error(
-        "{} of {asked} mm was asked, and the strips have {low} to {high} mm: too far to say anything. Pull two or more strips of {asked} mm", what.words()
+        "{} of {asked} mm was asked, and the strips have {} to {} mm: too far to say anything. Pull two or more strips of {asked} mm", what.words(), short(*low, 3), short(*high, 3), asked = short(*asked, 3)
     )]
     Outside {
         /// Which measure.

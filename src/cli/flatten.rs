@@ -52,6 +52,7 @@ pub fn run(args: &FlattenArgs, global: &Global, terminal: &Terminal) -> Result<(
         material: material_named(&args.size.material).map_err(Failure::bad)?,
         machine: machine_named(&args.machine).map_err(Failure::bad)?,
         sigma: args.size.sigma,
+        confidence: args.size.confidence,
         sizing: args.size.sizing(),
         cones: args.layout.cones()?,
         darts: args.layout.darts()?,

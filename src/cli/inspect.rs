@@ -96,6 +96,7 @@ pub fn run(args: &InspectArgs, global: &Global, terminal: &Terminal) -> Result<(
             import: args.surface.options(),
             material: material_named(&args.size.material).map_err(Failure::bad)?,
             sigma: args.size.sigma,
+            confidence: args.size.confidence,
             sizing: args.size.sizing(),
             ..Request::new(args.surface.source())
         };

@@ -26,6 +26,10 @@ pub struct SizeArgs {
     /// Largest stretch, in place of the material's: above 1, at most 2
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub sigma: Option<f64>,
+    /// Probability that no hinge fails, 0.5 to 0.999, for a material of which strips were pulled (see `kagome calibrate`);
+    /// with --sigma, it is proved for that [default: 0.9, and nothing is proved for --sigma]
+    #[arg(long, value_name = "P", allow_negative_numbers = true)]
+    pub confidence: Option<f64>,
 }
 
 impl SizeArgs {
@@ -44,6 +48,7 @@ impl SizeArgs {
             (self.triangles.is_some(), "--triangles"),
             (self.material != crate::material::DEFAULT, "--material"),
             (self.sigma.is_some(), "--sigma"),
+            (self.confidence.is_some(), "--confidence"),
         ];
         given
             .into_iter()

@@ -259,6 +259,7 @@ fn from_arguments(args: &MakeArgs) -> Result<Request, Failure> {
         material: material_named(&args.size.material).map_err(Failure::bad)?,
         machine: machine_named(&args.machine).map_err(Failure::bad)?,
         sigma: args.size.sigma,
+        confidence: args.size.confidence,
         hinge_width_mm: args.hinge,
         kerf_mm: args.kerf,
         mirror: args.mirror,

@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 1 the answer is no, 2 bad usage or bad input. Results go to standard output (`--json` for
 //! machines), everything else to standard error.
 
+pub mod calibrate;
 pub mod cut;
 pub mod flatten;
 pub mod form;
@@ -82,6 +83,8 @@ enum Verb {
     Machines(machines::MachinesArgs),
     /// List, show, check and start materials
     Materials(materials::MaterialsArgs),
+    /// Measure σ, kerf and setting of a sheet on a coupon, into a profile of your own
+    Calibrate(calibrate::CalibrateArgs),
     /// Read G-code back and judge it: bed, beam, modes, and every cut of its sheet
     Verify(verify::VerifyArgs),
     Send(send::SendArgs),
@@ -129,6 +132,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Verb::States(args) => states::run(args, global, &terminal),
         Verb::Samples(args) => samples::run(args, global, &terminal),
         Verb::Materials(args) => materials::run(args, global, &terminal),
+        Verb::Calibrate(args) => calibrate::run(args, global, &terminal),
         Verb::Machines(args) => machines::run(args, global, &terminal),
         Verb::Send(args) => send::run(args, global, &terminal),
         Verb::Sim(args) => sim::run(args, global, &terminal),

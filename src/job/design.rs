@@ -97,6 +97,9 @@ pub struct SheetChoice {
     pub machine: String,
     /// Largest scale factor.
     pub sigma: f64,
+    /// With which confidence no hinge fails; absent where no strips were pulled, and where σ is by hand.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub confidence: Option<f64>,
     /// Width of the ligaments, millimetres.
     pub hinge_width_mm: f64,
     /// Width of the cut, millimetres.
@@ -350,6 +353,9 @@ impl Design {
             ranged("linkage.shares", *share, 0.0, 1.0)?;
         }
         ranged("surface.mm_per_unit", self.surface.mm_per_unit, 1e-9, 1e9)?;
+        if let Some(confidence) = self.sheet.confidence {
+            ranged("sheet.confidence", confidence, 0.5, 0.999)?;
+        }
         ranged(
             "sheet.hinge_width_mm",
             self.sheet.hinge_width_mm,
@@ -496,6 +502,7 @@ impl Design {
             material: profile(&self.sheet.material),
             machine: profile(&self.sheet.machine),
             sigma: Some(self.sheet.sigma),
+            confidence: self.sheet.confidence,
             hinge_width_mm: Some(self.sheet.hinge_width_mm),
             kerf_mm: Some(self.sheet.kerf_mm),
             mirror: self.sheet.mirror,

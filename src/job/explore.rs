@@ -17,6 +17,7 @@ use super::maps::{Ground, Map, cone_opening_mm, maps};
 use super::report::{MapPage, map_html};
 use super::request::Request;
 use super::shape::lay_out;
+use super::strength::Strength;
 use crate::base::progress::Progress;
 use crate::conformal::{Cone, ConformalError, around_handles};
 use crate::linkage::SeamGuide;
@@ -47,10 +48,19 @@ pub fn explore(
         ..request.clone()
     };
     let material = crate::material::load(&request.material).map_err(MakeError::Material)?;
-    let sigma = checked_sigma(request.sigma.unwrap_or(material.sigma.max))?;
+    let mut sigma = checked_sigma(request.sigma.unwrap_or(material.sigma.max))?;
     check_sizing(request.sizing)?;
+    let strength = Strength::of(request, &material)?;
     progress.start("reading the surface", None);
     let loaded = load(request)?;
+    if let Some(strength) = strength.filter(|_| request.sigma.is_none()) {
+        let machine = crate::machine::load(&request.machine).map_err(MakeError::Machine)?;
+        let setting = material.cut_for(&machine).map_err(MakeError::Cut)?;
+        let options = stock(request, &material, &machine, &setting)?.options;
+        let (sizing, area_mm2) = (request.sizing, loaded.area_mm2());
+        sigma =
+            checked_sigma(strength.sigma(&options, material.thickness_mm, sizing, area_mm2)?)?;
+    }
     let surface = &loaded.import.surface;
     // As `make` does: handles around which the pattern cannot close are opened where that is left to the program.
     let free = request.darts_are_free();
@@ -165,6 +175,7 @@ impl Explored {
         let setting = material.cut_for(&machine).map_err(MakeError::Cut)?;
         let mut stock = stock(request, &material, &machine, &setting)?;
         stock.rim = self.loaded.rim(&stock.options);
+        stock.sigma = self.sigma;
         let map = self.best()?;
         let laid = lay_out(request, map, &[], &stock, progress)?;
         let taken = Taken {

@@ -92,6 +92,14 @@ impl Loaded {
         })
     }
 
+    /// Area of the surface, without its continuation, mm².
+    pub fn area_mm2(&self) -> f64 {
+        match &self.skirt {
+            Some(skirt) => skirt.inner.area(),
+            None => self.import.surface.area(),
+        }
+    }
+
     /// All surfaces that the pattern is to fit; `source` is that of the first.
     pub fn targets(&self, source: &Source) -> Targets {
         let first = Target::new(title(source), self.import.surface.clone());

@@ -21,6 +21,7 @@ use super::report::{self, DrawnSheet, Page, Pose, Stroke};
 use super::request::{Request, Source};
 use super::several::choose_for_all;
 use super::shape::{Fit, Shape, Stock, on_shape};
+use super::strength::{self, Strength};
 use super::verdict::{Reason, Verdict};
 use super::{MakeError, remedy, tell};
 use crate::base::atomic;
@@ -171,10 +172,21 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     let machine = crate::machine::load(&request.machine).map_err(MakeError::Machine)?;
     let setting = material.cut_for(&machine).map_err(MakeError::Cut)?;
     let mut stock = stock(request, &material, &machine, &setting)?;
+    let strength = Strength::of(request, &material)?;
 
     progress.start("reading the surface", None);
     let loaded = load(request)?;
     stock.rim = loaded.rim(&stock.options);
+    if let Some(strength) = strength.as_ref().filter(|_| request.sigma.is_none()) {
+        let thickness_mm = material.thickness_mm;
+        let sigma = strength.sigma(
+            &stock.options,
+            thickness_mm,
+            request.sizing,
+            loaded.area_mm2(),
+        )?;
+        stock.sigma = checked_sigma(sigma)?;
+    }
     let surface = &loaded.import.surface;
     let targets = loaded.targets(&request.source);
     targets.check_sizes(stock.sigma)?;
@@ -182,7 +194,7 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     if !shape.verdict.pass && request.solver == Solver::Exact {
         remedy::explain(request, &mut shape, &stock, &targets, progress)?;
     }
-    let mut warnings = tell::warnings(&loaded, &material, &shape, stock.sigma);
+    let mut warnings = tell::warnings(&loaded, &material, strength.is_some(), &shape, stock.sigma);
     warnings.extend(tell::tabs(&shape, stock.tabs));
 
     let edge_mm = shape.flat.edge_mm;
@@ -215,6 +227,18 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         .collect();
     for (fit, risks) in shape.fits.iter().zip(&risks) {
         warnings.extend(tell::risk(fit, risks));
+    }
+    let names: Vec<String> = targets.0.iter().map(|t| t.name.clone()).collect();
+    let proof = strength.map(|strength| {
+        let openings: Vec<&[f64]> = measured.iter().map(|(_, o)| o.as_slice()).collect();
+        let (options, thickness_mm) = (&stock.options, material.thickness_mm);
+        strength.prove(&shape.linkage, &openings, options, thickness_mm)
+    });
+    if let Some(proof) = &proof {
+        warnings.extend(proof.warnings(stock.sigma, &names));
+        let reasons = proof.reasons(&shape.fits, &names);
+        shape.verdict.pass &= reasons.is_empty();
+        shape.verdict.reasons.extend(reasons);
     }
     if shape.sheets.len() > MOST_SHEETS {
         return Err(MakeError::TooManySheets {
@@ -249,8 +273,12 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         shares: &shape.shares,
     };
     let design = decided(request, folder, &loaded, &taken, &stock);
-    let figures = tell::figures(&design, &loaded, &shape, &jobs, &warnings);
-    let summary = tell::summary(&material, &machine, &shape, &targets, &jobs, stock.sigma);
+    let mut figures = tell::figures(&design, &loaded, &shape, &jobs, &warnings);
+    let mut summary = tell::summary(&material, &machine, &shape, &targets, &jobs, stock.sigma);
+    if let Some(proof) = &proof {
+        figures["strength"] = proof.figures(stock.sigma, &shape.fits);
+        summary.extend(proof.line());
+    }
     let drawn_sheets: Vec<DrawnSheet> = shape
         .sheets
         .iter()
@@ -281,6 +309,7 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
             distances_in_l: &measured[n].0,
             openings: &measured[n].1,
             risks: &risks[n],
+            margins: proof.as_ref().and_then(|proof| proof.margins(n)),
         })
         .collect();
     let page = Page {
@@ -365,6 +394,7 @@ pub(crate) fn stock<'a>(
 ) -> Result<Stock<'a>, MakeError> {
     let stock = Stock {
         sigma: checked_sigma(request.sigma.unwrap_or(material.sigma.max))?,
+        confidence: strength::confidence(request, material)?,
         options: SheetOptions {
             hinge_width_mm: request.hinge_width_mm.unwrap_or(material.hinge_width_mm),
             kerf_mm: request.kerf_mm.unwrap_or(setting.kerf_mm),
@@ -387,6 +417,16 @@ pub(crate) fn stock<'a>(
         tabs: request.sheet.tabs,
         tab_width_mm: request.sheet.tab_width_mm,
     };
+    if let Some(value) = stock.confidence
+        && !(0.5..=0.999).contains(&value)
+    {
+        return Err(MakeError::Range {
+            what: "--confidence",
+            value,
+            least: 0.5,
+            most: 0.999,
+        });
+    }
     check_sizing(request.sizing)?;
     check_ranges(request.accept_distance, &stock)?;
     Ok(stock)
@@ -463,6 +503,7 @@ pub(crate) fn decided(
             material: profile_name(&request.material, folder),
             machine: profile_name(&request.machine, folder),
             sigma: stock.sigma,
+            confidence: stock.confidence,
             hinge_width_mm: stock.options.hinge_width_mm,
             kerf_mm: stock.options.kerf_mm,
             mirror: request.mirror,

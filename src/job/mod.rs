@@ -21,6 +21,7 @@ mod several;
 mod shape;
 mod sheets;
 mod states;
+mod strength;
 mod targets;
 mod tell;
 mod verdict;
@@ -41,6 +42,7 @@ pub use request::{
     Request, RimWish, SheetWish, Source, TAB_WIDTH_MM,
 };
 pub use states::{Opening, StateFigures, StateFiles};
+pub use strength::{CONFIDENCE, HingeMargin};
 pub use verdict::{COVERAGE_WANTED, EDGE_TOLERANCE, Reason, Verdict};
 
 use crate::base::catalog::CatalogError;
@@ -154,6 +156,24 @@ pub enum MakeError {
     Sigma {
         /// As given.
         sigma: f64,
+    },
+    /// A confidence where no strips were pulled.
+    #[error(
+        "--confidence goes with strips that were pulled, and the profile of {material} has none: cut a coupon (kagome calibrate), or leave it away"
+    )]
+    NoStrips {
+        /// The material.
+        material: String,
+    },
+    /// The strips of the material do not answer for such a sheet.
+    #[error(
+        "the strips of {material} give no σ for this sheet: {refusal}. Or give one by hand, --sigma"
+    )]
+    Strength {
+        /// The material.
+        material: String,
+        /// Why not.
+        refusal: crate::calibrate::Refusal,
     },
     /// A size that is none.
     #[error("{what} is {value}, it must be positive: for example {example}")]

@@ -138,6 +138,9 @@ pub struct Request {
     pub machine: String,
     /// Largest scale factor, in place of the material's.
     pub sigma: Option<f64>,
+    /// With which confidence no hinge fails, for a material of which strips were pulled; `None`: [`super::CONFIDENCE`], and
+    /// if σ is given, nothing is proved.
+    pub confidence: Option<f64>,
     /// Ligament width in millimetres, in place of the material's.
     pub hinge_width_mm: Option<f64>,
     /// Width of the cut in millimetres, in place of the material's.
@@ -197,6 +200,7 @@ impl Request {
             material: crate::material::DEFAULT.into(),
             machine: crate::machine::DEFAULT.into(),
             sigma: None,
+            confidence: None,
             hinge_width_mm: None,
             kerf_mm: None,
             mirror: false,

@@ -37,6 +37,8 @@ pub(crate) struct Rim {
 pub(crate) struct Stock<'a> {
     /// Largest scale factor.
     pub sigma: f64,
+    /// With which confidence no hinge fails, where strips say so.
+    pub confidence: Option<f64>,
     /// Hinge width, kerf and shapes.
     pub options: SheetOptions,
     /// Whose bed it must fit.

@@ -20,6 +20,7 @@ use crate::pattern::{Figures, HingeRisk, Sheet};
 pub(crate) fn warnings(
     loaded: &Loaded,
     material: &Material,
+    measured: bool,
     shape: &Shape,
     sigma: f64,
 ) -> Vec<String> {
@@ -35,7 +36,9 @@ pub(crate) fn warnings(
         let repairs = also.import.report.repairs().into_iter();
         warnings.extend(repairs.map(|r| format!("the mesh {} was mended: {r}", also.name)));
     }
-    if sigma > material.sigma.max {
+    if measured {
+        // The strips themselves are asked.
+    } else if sigma > material.sigma.max {
         warnings.push(format!(
             "σ = {} was asked for, but the profile {} says {} ({}): hinges are likely to tear. Cut a small trial first",
             short(sigma, 3),

@@ -270,6 +270,31 @@ impl Material {
         })
     }
 
+    /// The number, from 0, of the `[[cut]]` that [`Material::cut_for`] takes for a machine.
+    ///
+    /// # Errors
+    /// As [`Material::cut_for`].
+    pub fn cut_entry_for(&self, machine: &Machine) -> Result<usize, CutError> {
+        let setting = self.cut_for(machine)?;
+        let entries: Vec<&CutEntry> = self
+            .cut
+            .iter()
+            .filter(|c| c.process == setting.process)
+            .collect();
+        let best = match machine.tool() {
+            Some(Tool::Laser(laser)) => self.for_laser(machine, laser, &entries)?,
+            Some(Tool::Plasma(torch)) => self.for_torch(machine, torch, &entries)?,
+            None => {
+                return Err(CutError::NoTool {
+                    machine: machine.name.clone(),
+                });
+            }
+        };
+        // It is one of them.
+        let place = self.cut.iter().position(|c| std::ptr::eq(c, best));
+        Ok(place.unwrap_or(0))
+    }
+
     fn for_laser<'a>(
         &self,
         machine: &Machine,

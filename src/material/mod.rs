@@ -5,6 +5,7 @@
 //! where they come from: only a [`Source::Measured`] was measured. [`Material::cut_for`] gives the settings for one
 //! machine, every default filled in.
 
+mod amend;
 mod cut;
 mod fit;
 mod profile;
@@ -12,10 +13,12 @@ mod reading;
 mod shipped;
 mod start;
 
+pub use amend::{AmendError, Measured, MeasuredCut, amend};
 pub use cut::{CutEntry, EngraveEntry, Laser, PassOrder, Process};
 pub use fit::{CutError, CutSetting, Fit, MarkSetting, TorchSetting, classify};
 pub use profile::{Kind, Material, Sigma, Source, StockSize, Tip, TipShape};
 pub(crate) use profile::{check_format, check_name};
+pub(crate) use reading::check_date;
 pub use reading::{Failure, Reading, neck_mm};
 pub use shipped::{DEFAULT, load, own_file, own_files, parse, resolve, shipped};
 pub use start::start;

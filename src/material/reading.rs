@@ -158,7 +158,7 @@ impl Reading {
 }
 
 /// A day of the calendar, as ISO 8601 writes it.
-fn check_date(key: &str, date: &str) -> Result<(), Complaint> {
+pub(crate) fn check_date(key: &str, date: &str) -> Result<(), Complaint> {
     let wrong = || {
         Complaint::new(
             key,

@@ -4,6 +4,7 @@
 //! that are each cut at a power and a speed of their own. Each has a name, which is engraved beside it and stands in the
 //! readings.
 
+mod check;
 mod comb;
 mod plan;
 mod strip;

@@ -7,6 +7,7 @@
 
 mod histogram;
 mod map;
+mod margins;
 mod strokes;
 mod table;
 mod text;
@@ -18,6 +19,7 @@ use nalgebra::Point3;
 
 pub use histogram::histogram;
 pub use map::{MapPage, map_html};
+pub use margins::Margins;
 pub use strokes::{Role, Stroke};
 pub use text::{escape, svg_element};
 
@@ -82,6 +84,8 @@ pub struct Pose<'a> {
     pub distances_in_l: &'a [f64],
     /// How much of what the material bears every hinge uses.
     pub risks: &'a [HingeRisk],
+    /// How much of what the strips allow every hinge keeps; none where none were pulled.
+    pub margins: Option<Margins<'a>>,
     /// λ at every hinge.
     pub openings: &'a [f64],
 }
@@ -119,12 +123,9 @@ pub fn html(page: &Page<'_>) -> String {
         stretch(&mut out, &map, &places);
         linkage(&mut out, page, pose, &places);
         hinges(&mut out, page, pose);
-        risks(
-            &mut out,
-            page,
-            pose,
-            &views::around(View::front(pose.surface)),
-        );
+        let around = views::around(View::front(pose.surface));
+        risks(&mut out, page, pose, &around);
+        margins::margins(&mut out, page, pose, &around);
     }
     sheet(&mut out, page);
     toolpath(&mut out, page);

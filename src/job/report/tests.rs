@@ -92,6 +92,7 @@ fn with_page<T>(full: bool, then: impl FnOnce(&Page<'_>) -> T) -> T {
         distances_in_l: &vec![0.01; job.built.start.len()],
         openings: &vec![1.2; job.built.linkage.hinges.len()],
         risks: &risks,
+        margins: None,
     };
     then(&Page {
         title: "dish & \"bowl\" <1>",
