@@ -84,7 +84,7 @@ pub enum CouponError {
         /// Its triangles.
         edge_mm: f64,
         /// The reason.
-        source: PatternError,
+        source: Box<PatternError>,
     },
     /// The stock is too small.
     #[error(
@@ -271,7 +271,7 @@ impl Parts {
                     name: strip.name.clone(),
                     hinge_width_mm: strip.hinge_width_mm,
                     edge_mm: strip.edge_mm,
-                    source,
+                    source: Box::new(source),
                 })
         });
         let has_grid = !squares.is_empty();
