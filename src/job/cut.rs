@@ -80,6 +80,18 @@ pub(crate) fn cut(
         ..CutOptions::of(setting, machine, marks.as_ref())
     };
     let toolpath = plan(sheet, &options, machine.park_mm()).map_err(MakeError::Toolpath)?;
+    prove(toolpath, sheet, machine, material, setting, progress)
+}
+
+/// Writes, verifies and rehearses a toolpath that is to cut `sheet`.
+pub(crate) fn prove(
+    toolpath: Toolpath,
+    sheet: &Sheet,
+    machine: &Machine,
+    material: &Material,
+    setting: &CutSetting,
+    progress: &dyn Progress,
+) -> Result<CutResult, MakeError> {
     progress.check()?;
     let gcode = gcode::write(&toolpath, machine, material).map_err(MakeError::Gcode)?;
 

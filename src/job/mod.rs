@@ -5,6 +5,7 @@
 //! pattern or a job. One sheet may be made for several surfaces, see [`Request::also`]: the verdict holds for all.
 
 mod choose;
+mod coupon;
 mod cut;
 mod design;
 mod explore;
@@ -28,6 +29,7 @@ mod verdict;
 
 use std::path::PathBuf;
 
+pub use coupon::{COUPON_FILES, CouponFiles, make_coupon};
 pub use cut::{CutDrawing, cut_drawing};
 pub use design::{
     AlsoChoice, ConeChoice, CutChoice, DartChoice, Design, LinkageChoice, SheetChoice, SolveChoice,
@@ -53,6 +55,9 @@ use crate::mesh::VertexId;
 /// Why nothing was made.
 #[derive(Debug, thiserror::Error)]
 pub enum MakeError {
+    /// A coupon that cannot be.
+    #[error(transparent)]
+    Coupon(#[from] crate::calibrate::CouponError),
     /// The stock has no room for anything.
     #[error(
         "the stock leaves {width_mm} x {height_mm} mm inside margins of {margin_mm} mm: nothing that has a hinge fits. Use larger stock (--stock), or a smaller margin_mm in the machine's profile"

@@ -156,15 +156,16 @@ pub(super) fn card(strips: &[Strip], step: f64, shapes: &SheetOptions) -> Sheet 
     for (n, &length) in lengths.iter().enumerate() {
         // Ticks hang from the upper edge of each scale.
         let top = rect.y1 - SCALE_MM * n as f64 - 1.5;
+        // As tall as lets a number stand beside the next.
+        let room = 0.8 * 0.1 * length;
+        let tall = 0.8 * TEXT_MM * (room / crate::pattern::width_mm("1.8", 0.8 * TEXT_MM)).min(1.0);
         let mut lines = vec![tick(WALL_MM, top, TICKS_MM[0])];
         for (stretch, rank) in ticks(step) {
             let x = WALL_MM + stretch * length;
             lines.push(tick(x, top, TICKS_MM[rank]));
             if rank == 0 {
-                let at = Point::new(x, top - TICKS_MM[0] - 0.8 - 0.4 * TEXT_MM);
-                sheet
-                    .marks
-                    .push(label(&format!("{stretch:.1}"), at, 0.8 * TEXT_MM));
+                let at = Point::new(x, top - TICKS_MM[0] - 0.8 - 0.5 * tall);
+                sheet.marks.push(label(&format!("{stretch:.1}"), at, tall));
             }
         }
         sheet.marks.push(Mark {

@@ -8,7 +8,7 @@ use kurbo::{Point, Rect};
 
 use super::comb::{card, kerf_plate, setting_plate};
 use super::{Coupon, Strip};
-use crate::machine::Machine;
+use crate::machine::{HeightControl, Machine};
 use crate::material::{CutError, CutSetting, Material, neck_mm};
 use crate::pattern::{PatternError, Sheet, SheetOptions, StockArea, Tip, nest};
 use crate::toolpath::{CutOptions, Role, Toolpath, ToolpathError, plan};
@@ -259,7 +259,7 @@ impl Parts {
         setting: &CutSetting,
         engraved: bool,
     ) -> Result<Self, CouponError> {
-        let [powers, speeds] = grid(machine, material, setting);
+        let [powers, speeds] = grid(machine, setting);
         let (settings, squares) =
             setting_plate(&powers, &speeds, square_mm(machine), shapes, engraved);
         let (kerf, kerf_pieces) = kerf_plate(shapes, engraved);
@@ -382,10 +382,11 @@ impl Placed<'_> {
 }
 
 /// Powers and speeds of the grid; none where the table's own list of materials sets them.
-fn grid(machine: &Machine, material: &Material, setting: &CutSetting) -> [Vec<f64>; 2] {
+fn grid(machine: &Machine, setting: &CutSetting) -> [Vec<f64>; 2] {
+    // QtPlasmaC takes the speed from the material that is chosen on its panel, one for the whole job.
     let of_table = machine
         .plasma()
-        .is_some_and(|torch| torch.material_numbers.contains_key(&material.name));
+        .is_some_and(|torch| torch.height_control == HeightControl::QtPlasmaC);
     if of_table {
         return [Vec::new(), Vec::new()];
     }

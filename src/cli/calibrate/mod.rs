@@ -1,5 +1,6 @@
 //! `kagome calibrate`: σ and kerf of a sheet, measured on a coupon.
 
+mod coupon;
 mod dialogue;
 mod fit;
 mod outcome;
@@ -15,6 +16,7 @@ use super::{Failure, Global, Terminal};
 /// Options of `kagome calibrate`.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "Examples:
+  kagome calibrate coupon --material leather-1.6 -o leather-coupon
   kagome calibrate record leather-coupon --readings leather-coupon/readings.csv
   kagome calibrate record leather-coupon
   kagome calibrate fit leather-coupon/readings.toml
@@ -26,6 +28,8 @@ pub struct CalibrateArgs {
 
 #[derive(Subcommand, Clone, Debug)]
 enum What {
+    /// Jobs, drawings and a guide for a small sheet of strips, squares and a gauge card
+    Coupon(coupon::CouponArgs),
     /// Write down what was read from a coupon, from a file or in a dialogue: readings.toml
     Record(record::RecordArgs),
     /// From readings to σ with a stated confidence, kerf and setting, in a profile of your own
@@ -38,6 +42,7 @@ enum What {
 /// [`Failure`]: readings that cannot be are bad input; readings that give no bound are a no.
 pub fn run(args: &CalibrateArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
     match &args.what {
+        What::Coupon(args) => coupon::run(args, global, terminal),
         What::Record(args) => record::run(args, global, terminal),
         What::Fit(args) => fit::run(args, global, terminal),
     }
