@@ -12,7 +12,7 @@ use crate::pattern::{Sheet, svg};
 const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;max-width:190mm;margin:8mm auto;padding:0 4mm;color:#111}\
 h1{font-size:22px}h2{font-size:17px;margin-top:1.4em}table{border-collapse:collapse}td,th{border:1px solid #999;padding:2px 8px;text-align:left}\
 td:empty{min-width:18mm}figure{margin:1em 0}figure.plan svg{width:100%;height:auto;max-height:150mm}figure.plan path,figure.plan circle{vector-effect:non-scaling-stroke;stroke-width:.8px}\
-figure.card path{stroke-width:.25mm}@media print{h2{break-after:avoid}figure,tr{break-inside:avoid}}";
+@media print{h2{break-after:avoid}figure,tr{break-inside:avoid}}";
 
 /// The page.
 pub(super) fn html(
