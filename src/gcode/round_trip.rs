@@ -216,7 +216,7 @@ fn findings(text: &str, machine: &Machine, sheet: &Sheet, passes: u32) -> Vec<Fi
 const TORCHES: [&str; 3] = ["plasma-generic", "plasma-linuxcnc", "plasma-qtplasmac"];
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+    #![proptest_config(crate::base::cases::cases(48))]
 
     #[test]
     fn every_torch_cuts_the_sheet(removed in removed(), torch in 0usize..3, marked: bool) {
