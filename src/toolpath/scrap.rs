@@ -4,6 +4,8 @@
 //! touches nothing that stays, and meets the outline at a slant in the direction of the cut; the *lead-out* leaves it
 //! the same way. Both start from the middle of a straight piece, so that no corner is marked.
 
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_6};
+
 use kurbo::{Point, Vec2};
 use rstar::primitives::{GeomWithData, Line};
 use rstar::{AABB, RTree};
@@ -16,7 +18,7 @@ use crate::pattern::{Contour, Sheet};
 
 /// Angles between a lead and the cut that are tried, radians: a slant leaves the least mark, straight on needs the least
 /// room along the rim.
-const SLANTS: [f64; 4] = [1.05, std::f64::consts::FRAC_PI_2, 0.7, 2.1];
+const SLANTS: [f64; 4] = [1.05, FRAC_PI_2, 0.7, 2.1];
 
 /// Kept between a pierce hole and the finished part, millimetres.
 const CLEAR_MM: f64 = 0.05;
@@ -25,11 +27,48 @@ const CLEAR_MM: f64 = 0.05;
 const ON_RIM_MM: f64 = 1e-3;
 
 /// Angles from the outward direction that are tried for a way in from the rim to a slit, radians.
-const WAYS: [f64; 7] = [0.0, 0.26, -0.26, 0.52, -0.52, 0.79, -0.79];
+/// Multiples of 15°: so one of them runs in the middle of any corner of the lattice.
+const WAYS: [f64; 7] = [
+    0.0,
+    FRAC_PI_12,
+    -FRAC_PI_12,
+    FRAC_PI_6,
+    -FRAC_PI_6,
+    FRAC_PI_4,
+    -FRAC_PI_4,
+];
+
+const FRAC_PI_12: f64 = 0.5 * FRAC_PI_6;
+
+/// How far from the tail of a slit a way in from the rim may burn the rim, half kerfs. The slit itself burns as far as
+/// one. In the middle of a corner of angle φ a beam takes from its sides up to 1 / sin(φ/2): 1.155 in one of 120°,
+/// which is too little to see, but 2 in a notch of 60°, from both.
+const AROUND_TAIL: f64 = 1.16;
 
 /// The finished edges of a sheet by place.
 pub(super) struct Scrap {
     edges: RTree<GeomWithData<Line<[f64; 2]>, u32>>,
+}
+
+/// The parts of a segment that lie farther from a place than a distance.
+fn beyond([a, b]: [Point; 2], place: Point, distance: f64) -> [Option<[Point; 2]>; 2] {
+    let (d, w) = (b - a, place - a);
+    let length = d.hypot();
+    let along = w.dot(d) / length;
+    let away = w.cross(d) / length;
+    let reach = distance * distance - away * away;
+    if length == 0.0 || reach <= 0.0 {
+        let far = length > 0.0 || w.hypot() > distance;
+        return [far.then_some([a, b]), None];
+    }
+    let (from, to) = (along - reach.sqrt(), along + reach.sqrt());
+    if from >= length || to <= 0.0 {
+        return [Some([a, b]), None];
+    }
+    [
+        (from > 0.0).then(|| [a, a.lerp(b, from / length)]),
+        (to < length).then(|| [a.lerp(b, to / length), b]),
+    ]
 }
 
 fn ends(line: &Line<[f64; 2]>) -> (Point, Point) {
@@ -82,12 +121,28 @@ impl Scrap {
         if self.clearance(pierce, hole) < hole {
             return false;
         }
-        // Steps of half a kerf: an edge that came between two of them would be nearer than half a kerf to one.
+        self.keeps_clear([pierce, to], kerf_mm, None)
+    }
+
+    /// Whether a beam along a segment touches no finished edge, or none farther from a place than a distance: there
+    /// another one burns.
+    fn keeps_clear(&self, way: [Point; 2], kerf_mm: f64, but: Option<(Point, f64)>) -> bool {
         let half = 0.5 * kerf_mm;
-        let steps = (pierce.distance(to) / half).ceil().clamp(1.0, 10_000.0);
-        (0..steps as usize).all(|k| {
-            let p = pierce.lerp(to, k as f64 / steps);
-            self.clearance(p, half) >= half - 2.0 * CHORD_ERROR_MM
+        let least = half - 2.0 * CHORD_ERROR_MM;
+        let [a, b] = way;
+        let near = AABB::from_corners(
+            [a.x.min(b.x) - half, a.y.min(b.y) - half],
+            [a.x.max(b.x) + half, a.y.max(b.y) + half],
+        );
+        let mut edges = self.edges.locate_in_envelope_intersecting(near);
+        edges.all(|edge| {
+            let (c, d) = ends(edge.geom());
+            let parts = match but {
+                Some((place, reach)) => beyond([c, d], place, reach),
+                None => [Some([c, d]), None],
+            };
+            let mut parts = parts.into_iter().flatten();
+            parts.all(|part| plane::between_segments(way, part) >= least)
         })
     }
 
@@ -246,9 +301,12 @@ impl Scrap {
         for length in [options.lead_in_mm.max(least), 1.5 * least, least] {
             for turn in WAYS {
                 let pierce = tail + Vec2::from_angle(turn + outwards.atan2()) * length;
-                // Near the tail the slit itself burns half a kerf to each side.
-                let end = tail.lerp(pierce, (kerf_mm / length).min(1.0));
-                if self.is_free(pierce, end, options.pierce_mm, kerf_mm) && !self.is_part(pierce) {
+                let hole = 0.5 * options.pierce_mm + CLEAR_MM;
+                let around_tail = Some((tail, AROUND_TAIL * 0.5 * kerf_mm));
+                if self.clearance(pierce, hole) >= hole
+                    && self.keeps_clear([pierce, tail], kerf_mm, around_tail)
+                    && !self.is_part(pierce)
+                {
                     return Some(Curve::line(pierce, tail));
                 }
             }
