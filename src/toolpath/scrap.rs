@@ -372,3 +372,97 @@ fn lead(along: Vec2, slant: f64, side: Side) -> Vec2 {
     };
     aside * slant.sin() - along * slant.cos()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linkage::{Handedness, Linkage};
+    use crate::pattern::SheetOptions;
+
+    /// A plate with a corner of this angle cut into it from below, its vertex at the origin, its sides 50 mm long.
+    fn notched(angle_deg: f64) -> Scrap {
+        let linkage = Linkage::patch(20.0, Handedness::Right, &Linkage::hexagon_cells(1));
+        let mut sheet = Sheet::new(&linkage, &SheetOptions::plain(1.0, 0.2)).unwrap();
+        let tip = 50.0 * Vec2::from_angle(f64::to_radians(0.5 * angle_deg - 90.0));
+        let corners = [
+            (-tip.x, tip.y),
+            (0., 0.),
+            (tip.x, tip.y),
+            (tip.x, 30.),
+            (-tip.x, 30.),
+        ];
+        sheet.contours = vec![Contour {
+            line: Curve::polyline(corners.map(Point::from), true),
+            outer: true,
+        }];
+        Scrap::new(&sheet)
+    }
+
+    fn options(pierce_mm: f64) -> CutOptions {
+        let machine = crate::machine::load(crate::machine::DEFAULT).unwrap();
+        let material = crate::material::load(crate::material::DEFAULT).unwrap();
+        CutOptions {
+            pierce_mm,
+            lead_in_mm: 3.0,
+            ..CutOptions::of(&material.cut_for(&machine).unwrap(), &machine, None)
+        }
+    }
+
+    #[test]
+    fn a_way_to_the_rim_burns_no_more_of_it_than_its_slit_or_is_none() {
+        let kerf_mm = 0.2;
+        for (angle_deg, entered) in [(60.0, false), (90.0, false), (120.0, true), (180.0, true)] {
+            for slit_deg in [-30.0, 0.0, 30.0] {
+                let outwards = Vec2::from_angle(f64::to_radians(slit_deg - 90.0));
+                let scrap = notched(angle_deg);
+                let way = scrap.way_to_rim(Point::ORIGIN, outwards, &options(0.9), kerf_mm);
+                assert_eq!(way.is_some(), entered, "{angle_deg} {slit_deg}");
+                let Some(way) = way else { continue };
+                // Every place of the rim that the beam reaches is one that the slit reaches, to a hundredth of a
+                // millimetre and a half.
+                let side = Vec2::from_angle(f64::to_radians(0.5 * angle_deg - 90.0));
+                let line = way.flattened(CHORD_ERROR_MM);
+                for k in 0..200 {
+                    let along = 0.01 * f64::from(k);
+                    let rim = (side * along).to_point();
+                    if plane::from_segment(rim, line[0], line[1]) < 0.5 * kerf_mm - 0.004 {
+                        assert!(along < 0.5 * kerf_mm + 0.016, "{angle_deg}: {along}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_beam_that_passes_a_corner_between_two_points_touches_it() {
+        // The tip of a corner is 0.09 mm beside the middle of a way: half a kerf is 0.1, and its ends are far off.
+        let scrap = notched(60.0);
+        for (beside, clear) in [(0.09, false), (0.101, true)] {
+            for middle in [0.0, 0.013, 0.05] {
+                let tip = 50.0 * Vec2::from_angle(f64::to_radians(-60.0));
+                let (x, y) = (tip.x + middle, tip.y - beside);
+                let way = [Point::new(x - 0.2, y), Point::new(x + 0.2, y)];
+                let found = scrap.keeps_clear(way, 0.2, None);
+                assert_eq!(found, clear, "{beside} {middle}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_lies_beyond_a_circle_is_both_ends_or_all_or_nothing() {
+        let line = [Point::new(0.0, 0.0), Point::new(10.0, 0.0)];
+        let length = |place: (f64, f64), r: f64| -> Vec<f64> {
+            let parts = beyond(line, place.into(), r).into_iter().flatten();
+            parts.map(|[a, b]| a.distance(b)).collect()
+        };
+        assert_eq!(length((5.0, 3.0), 5.0), [1.0, 1.0]);
+        assert_eq!(length((0.0, 0.0), 4.0), [6.0]);
+        assert_eq!(length((12.0, 0.0), 4.0), [8.0]);
+        assert_eq!(length((5.0, 6.0), 5.0), [10.0]);
+        assert_eq!(length((30.0, 0.0), 5.0), [10.0]);
+        assert!(length((5.0, 0.0), 6.0).is_empty());
+        let spot = [line[0]; 2];
+        assert_eq!(beyond(spot, Point::new(1.0, 0.0), 2.0), [None, None]);
+        assert_eq!(beyond(spot, Point::new(3.0, 0.0), 2.0), [Some(spot), None]);
+    }
+}
