@@ -14,6 +14,8 @@
 //! - [`units`]: the few conversions and number formats that several rooms share.
 
 pub mod atomic;
+#[cfg(test)]
+pub mod cases;
 pub mod catalog;
 pub mod curve;
 pub mod document;

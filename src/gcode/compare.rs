@@ -11,7 +11,7 @@ use super::write::Declared;
 use crate::base::curve::Curve;
 use crate::base::units::short;
 use crate::pattern::{Sheet, Star};
-use crate::toolpath::{ToolpathError, outline, without_tabs};
+use crate::toolpath::{ToolpathError, outline, tabs_by_outline, without_tabs};
 
 /// Gaps below this are rounding, millimetres.
 pub(super) const NO_GAP_MM: f64 = 1e-6;
@@ -104,12 +104,15 @@ impl Wanted {
         }
         // Leads meet contours at a slant, and those to slits on the rim cross it.
         let leads = if declared.leads { 4.0 * JOINT_MM } else { 0.0 };
+        let outlines = sheet.contours.iter().map(|c| outline(c, kerf));
+        let outlines = outlines.collect::<Result<Vec<Curve>, _>>()?;
+        let tabs = tabs_by_outline(&outlines, &sheet.tabs);
         for (n, contour) in sheet.contours.iter().enumerate() {
             let kind = if contour.outer { Kind::Rim } else { Kind::Hole };
-            let closed = outline(contour, kerf)?;
-            let stretches = without_tabs(&closed.opened_at(0, 0.0), &sheet.tabs, kerf);
+            let closed = &outlines[n];
+            let stretches = without_tabs(&closed.opened_at(0, 0.0), &tabs[n], kerf);
             if stretches.is_empty() {
-                wanted.add(kind, &closed, declared.overcut_mm + leads, Some(n));
+                wanted.add(kind, closed, declared.overcut_mm + leads, Some(n));
             }
             for stretch in stretches {
                 wanted.add(kind, &stretch, leads, Some(n));

@@ -95,16 +95,7 @@ fn cut(interval: Interval, offset: f64, slope: f64, low: f64, high: f64) -> Opti
 
 /// Least distance between two segments.
 pub(super) fn distance(a: &Segment, b: &Segment) -> f64 {
-    let (u, v, w) = (a.b - a.a, b.b - b.a, b.a - a.a);
-    let across = u.cross(v);
-    if across != 0.0 {
-        let (s, t) = (w.cross(v) / across, w.cross(u) / across);
-        if (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t) {
-            return 0.0;
-        }
-    }
-    let to = |p: Point, s: &Segment| plane::from_segment(p, s.a, s.b);
-    to(a.a, b).min(to(a.b, b)).min(to(b.a, a)).min(to(b.b, a))
+    plane::between_segments([a.a, a.b], [b.a, b.b])
 }
 
 /// Segments by place.

@@ -216,7 +216,7 @@ fn findings(text: &str, machine: &Machine, sheet: &Sheet, passes: u32) -> Vec<Fi
 const TORCHES: [&str; 3] = ["plasma-generic", "plasma-linuxcnc", "plasma-qtplasmac"];
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+    #![proptest_config(crate::base::cases::cases(48))]
 
     #[test]
     fn every_torch_cuts_the_sheet(removed in removed(), torch in 0usize..3, marked: bool) {
@@ -768,5 +768,50 @@ fn the_frame_of_a_job_is_good_on_every_shipped_machine() {
         let verdict = verify(&text, &machine, None, None).unwrap();
         assert_eq!(verdict.findings, [], "{name}: {text}");
         assert_eq!(super::machine_of(&text), Some(name));
+    }
+}
+
+/// The job of a right-handed or left-handed patch without some of its cells, pierced wide, cut once.
+fn pierced_wide(
+    handedness: Handedness,
+    removed: &[usize],
+    rounded: bool,
+    tabs: bool,
+) -> (Sheet, Vec<Finding>) {
+    let linkage = patch(handedness, &removed.iter().copied().collect());
+    let cut = wide_cut(0.9, 1, PassOrder::Cut);
+    let (sheet, text, machine) = shaped(&linkage, Tip::Plain, rounded, cut, tabs);
+    let found = findings(&text, &machine, &sheet, 1);
+    (sheet, found)
+}
+
+/// Between two triangles that stand 60° apart a beam on the way to their corner would eat from both.
+#[test]
+fn a_way_in_from_the_rim_keeps_out_of_a_narrow_notch() {
+    for removed in [
+        &[4, 14, 23, 27][..],
+        &[16, 24, 36, 45],
+        &[0, 16, 34, 45, 51],
+    ] {
+        let (_, found) = pierced_wide(Handedness::Left, removed, true, false);
+        assert_eq!(found, [], "{removed:?}");
+    }
+}
+
+/// Where a hole's corner touches the rim, a tab of the rim leaves the hole as it is: its scrap must fall out, and from
+/// such a corner there is no way in.
+#[test]
+fn a_tab_of_the_rim_is_none_of_the_hole_that_touches_it() {
+    for removed in [&[1, 4][..], &[48, 51], &[0, 2, 10, 49, 52], &[1, 4, 12]] {
+        let (sheet, found) = pierced_wide(Handedness::Right, removed, false, true);
+        assert_eq!(found, [], "{removed:?}");
+        let corners = |c: &Contour| -> Vec<_> { c.line.vertices.iter().map(|v| v.at).collect() };
+        let holes = sheet.contours.iter().filter(|c| !c.outer);
+        assert!(
+            holes
+                .flat_map(corners)
+                .any(|p| sheet.tabs.iter().any(|t| t.at.distance(p) < 0.001)),
+            "no tab is where a hole touches the rim: {removed:?}"
+        );
     }
 }

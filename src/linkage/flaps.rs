@@ -782,7 +782,7 @@ pub(super) mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..crate::base::cases::cases(40) })]
 
         /// Whatever is missing from whatever surface: flaps touch nothing but what they hang on.
         #[test]

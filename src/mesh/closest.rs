@@ -337,7 +337,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(24))]
+        #![proptest_config(crate::base::cases::cases(24))]
         #[test]
         fn it_agrees_with_trying_every_face_whatever_the_hint(
             which in 0usize..10,

@@ -256,7 +256,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(64))]
+        #![proptest_config(crate::base::cases::cases(64))]
         #[test]
         fn topology_and_area_stay_and_the_vertex_is_near_the_point(
             which in 0usize..10, face in 0u32..300, s in 0.0..1.0f64, t in 0.0..1.0f64,

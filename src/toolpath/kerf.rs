@@ -118,22 +118,11 @@ pub fn without_tabs(line: &Curve, tabs: &[Tab], kerf_mm: f64) -> Vec<Curve> {
     let whole = line.length();
     let mut gaps: Vec<(f64, f64)> = Vec::new();
     for tab in tabs {
-        let mut best = (kerf_mm, None);
-        let mut before = 0.0;
-        for piece in line
-            .pieces()
-            .filter(|p| p.bulge == 0.0 || p.arc().is_some())
-        {
-            let length = piece.length();
-            let part = nearest_part(&piece, tab.at);
-            let away = piece.at(part).distance(tab.at);
-            if away <= best.0 {
-                best = (away, Some(before + part * length));
-            }
-            before += length;
+        let (away, at) = nearest(line, tab.at);
+        if away <= kerf_mm {
+            let half = 0.5 * (tab.width_mm + kerf_mm);
+            gaps.push((at - half, at + half));
         }
-        let half = 0.5 * (tab.width_mm + kerf_mm);
-        gaps.extend(best.1.map(|at| (at - half, at + half)));
     }
     if gaps.is_empty() {
         return Vec::new();
@@ -159,6 +148,38 @@ pub fn without_tabs(line: &Curve, tabs: &[Tab], kerf_mm: f64) -> Vec<Curve> {
         stretches.push(stretch);
     }
     stretches
+}
+
+/// The tabs of every outline: each is one of that which it is nearest to. A hole may touch the rim in a corner, and a tab
+/// there holds the part, not the hole's scrap.
+pub fn tabs_by_outline(outlines: &[Curve], tabs: &[Tab]) -> Vec<Vec<Tab>> {
+    let mut all = vec![Vec::new(); outlines.len()];
+    for tab in tabs {
+        let away = outlines.iter().map(|line| nearest(line, tab.at).0);
+        if let Some((n, _)) = away.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)) {
+            all[n].push(tab.clone());
+        }
+    }
+    all
+}
+
+/// How far a point is from a line, and how far along the line that is.
+fn nearest(line: &Curve, p: Point) -> (f64, f64) {
+    let mut best = (f64::INFINITY, 0.0);
+    let mut before = 0.0;
+    for piece in line
+        .pieces()
+        .filter(|p| p.bulge == 0.0 || p.arc().is_some())
+    {
+        let length = piece.length();
+        let part = nearest_part(&piece, p);
+        let away = piece.at(part).distance(p);
+        if away <= best.0 {
+            best = (away, before + part * length);
+        }
+        before += length;
+    }
+    best
 }
 
 /// Shorter stretches between two tabs are left to hold, millimetres.

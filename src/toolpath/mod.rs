@@ -11,7 +11,7 @@ mod path;
 mod scrap;
 mod star;
 
-pub use kerf::{CHORD_ERROR_MM, outline, without_tabs};
+pub use kerf::{CHORD_ERROR_MM, outline, tabs_by_outline, without_tabs};
 pub use order::{Heat, LOOKBACK, Spacing, Way, order_strokes, spacing};
 pub use path::{
     CornerSlowdown, Cut, CutOptions, Figures, Role, SmallHoles, Step, Toolpath, ToolpathError, plan,

@@ -8,7 +8,7 @@ use super::{kerf, star};
 use crate::base::curve::{Curve, Piece};
 use crate::machine::Machine;
 use crate::material::{CutSetting, MarkSetting, PassOrder};
-use crate::pattern::{Contour, Sheet, Star};
+use crate::pattern::{Contour, Sheet, Star, Tab};
 
 /// What a cut is for; also the order in which cuts are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
@@ -376,9 +376,20 @@ pub fn plan(
     };
     planner.marks(sheet);
     planner.slits(sheet, &scrap, pierce_mm)?;
-    for role in [Role::Inner, Role::Outer] {
-        planner.contours(sheet, &scrap, role)?;
+    let outlines = sheet.contours.iter().map(|c| kerf::outline(c, kerf_mm));
+    let outlines = outlines.collect::<Result<Vec<Curve>, _>>()?;
+    let tabs = kerf::tabs_by_outline(&outlines, &sheet.tabs);
+    let mut closed = Vec::with_capacity(outlines.len());
+    for ((contour, outline), tabs) in sheet.contours.iter().zip(outlines).zip(tabs) {
+        closed.push(Closed {
+            contour,
+            outline,
+            tabs,
+        });
     }
+    let (rims, holes) = closed.into_iter().partition(|c| c.contour.outer);
+    planner.contours(holes, &scrap, kerf_mm, Role::Inner)?;
+    planner.contours(rims, &scrap, kerf_mm, Role::Outer)?;
     Ok(Toolpath {
         cuts: planner.cuts,
         start,
@@ -386,6 +397,13 @@ pub fn plan(
         pierce_mm,
         overcut_mm: options.overcut_mm,
     })
+}
+
+/// A contour, where the beam runs around it, and the tabs on that.
+struct Closed<'a> {
+    contour: &'a Contour,
+    outline: Curve,
+    tabs: Vec<Tab>,
 }
 
 struct Planner<'a> {
@@ -544,22 +562,23 @@ impl Planner<'_> {
         Some((way, arm.outwards()))
     }
 
-    fn contours(&mut self, sheet: &Sheet, scrap: &Scrap, role: Role) -> Result<(), ToolpathError> {
-        let kerf_mm = sheet.metadata.kerf_mm;
-        let mut left = Vec::new();
-        for contour in sheet
-            .contours
-            .iter()
-            .filter(|c| c.outer == (role == Role::Outer))
-        {
-            left.push((contour, kerf::outline(contour, kerf_mm)?));
-        }
-        while let Some(next) = nearest(left.iter().map(|(_, line)| line), self.at) {
-            let (contour, outline) = left.swap_remove(next);
+    fn contours(
+        &mut self,
+        mut left: Vec<Closed<'_>>,
+        scrap: &Scrap,
+        kerf_mm: f64,
+        role: Role,
+    ) -> Result<(), ToolpathError> {
+        while let Some(next) = nearest(left.iter().map(|c| &c.outline), self.at) {
+            let Closed {
+                contour,
+                outline,
+                tabs,
+            } = left.swap_remove(next);
             if role == Role::Inner
                 && let Some(small) = self.options.small_holes
                 && across_is_below(&contour.line, small.below_mm)
-                && kerf::without_tabs(&outline.opened_at(0, 0.0), &sheet.tabs, kerf_mm).is_empty()
+                && kerf::without_tabs(&outline.opened_at(0, 0.0), &tabs, kerf_mm).is_empty()
             {
                 self.small_hole(contour, &outline, small, scrap, kerf_mm)?;
                 continue;
@@ -572,7 +591,7 @@ impl Planner<'_> {
                 self.at,
                 Side::Right,
             )?;
-            let stretches = kerf::without_tabs(&ways.line, &sheet.tabs, kerf_mm);
+            let stretches = kerf::without_tabs(&ways.line, &tabs, kerf_mm);
             if stretches.is_empty() {
                 self.push(role, ways.line, self.options.passes);
                 self.lead(ways.lead_in, ways.lead_out);

@@ -4,6 +4,8 @@
 //! touches nothing that stays, and meets the outline at a slant in the direction of the cut; the *lead-out* leaves it
 //! the same way. Both start from the middle of a straight piece, so that no corner is marked.
 
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_6};
+
 use kurbo::{Point, Vec2};
 use rstar::primitives::{GeomWithData, Line};
 use rstar::{AABB, RTree};
@@ -16,7 +18,7 @@ use crate::pattern::{Contour, Sheet};
 
 /// Angles between a lead and the cut that are tried, radians: a slant leaves the least mark, straight on needs the least
 /// room along the rim.
-const SLANTS: [f64; 4] = [1.05, std::f64::consts::FRAC_PI_2, 0.7, 2.1];
+const SLANTS: [f64; 4] = [1.05, FRAC_PI_2, 0.7, 2.1];
 
 /// Kept between a pierce hole and the finished part, millimetres.
 const CLEAR_MM: f64 = 0.05;
@@ -25,11 +27,48 @@ const CLEAR_MM: f64 = 0.05;
 const ON_RIM_MM: f64 = 1e-3;
 
 /// Angles from the outward direction that are tried for a way in from the rim to a slit, radians.
-const WAYS: [f64; 7] = [0.0, 0.26, -0.26, 0.52, -0.52, 0.79, -0.79];
+/// Multiples of 15°: so one of them runs in the middle of any corner of the lattice.
+const WAYS: [f64; 7] = [
+    0.0,
+    FRAC_PI_12,
+    -FRAC_PI_12,
+    FRAC_PI_6,
+    -FRAC_PI_6,
+    FRAC_PI_4,
+    -FRAC_PI_4,
+];
+
+const FRAC_PI_12: f64 = 0.5 * FRAC_PI_6;
+
+/// How far from the tail of a slit a way in from the rim may burn the rim, half kerfs. The slit itself burns as far as
+/// one. In the middle of a corner of angle φ a beam takes from its sides up to 1 / sin(φ/2): 1.155 in one of 120°,
+/// which is too little to see, but 2 in a notch of 60°, from both.
+const AROUND_TAIL: f64 = 1.16;
 
 /// The finished edges of a sheet by place.
 pub(super) struct Scrap {
     edges: RTree<GeomWithData<Line<[f64; 2]>, u32>>,
+}
+
+/// The parts of a segment that lie farther from a place than a distance.
+fn beyond([a, b]: [Point; 2], place: Point, distance: f64) -> [Option<[Point; 2]>; 2] {
+    let (d, w) = (b - a, place - a);
+    let length = d.hypot();
+    let along = w.dot(d) / length;
+    let away = w.cross(d) / length;
+    let reach = distance * distance - away * away;
+    if length == 0.0 || reach <= 0.0 {
+        let far = length > 0.0 || w.hypot() > distance;
+        return [far.then_some([a, b]), None];
+    }
+    let (from, to) = (along - reach.sqrt(), along + reach.sqrt());
+    if from >= length || to <= 0.0 {
+        return [Some([a, b]), None];
+    }
+    [
+        (from > 0.0).then(|| [a, a.lerp(b, from / length)]),
+        (to < length).then(|| [a.lerp(b, to / length), b]),
+    ]
 }
 
 fn ends(line: &Line<[f64; 2]>) -> (Point, Point) {
@@ -82,12 +121,28 @@ impl Scrap {
         if self.clearance(pierce, hole) < hole {
             return false;
         }
-        // Steps of half a kerf: an edge that came between two of them would be nearer than half a kerf to one.
+        self.keeps_clear([pierce, to], kerf_mm, None)
+    }
+
+    /// Whether a beam along a segment touches no finished edge, or none farther from a place than a distance: there
+    /// another one burns.
+    fn keeps_clear(&self, way: [Point; 2], kerf_mm: f64, but: Option<(Point, f64)>) -> bool {
         let half = 0.5 * kerf_mm;
-        let steps = (pierce.distance(to) / half).ceil().clamp(1.0, 10_000.0);
-        (0..steps as usize).all(|k| {
-            let p = pierce.lerp(to, k as f64 / steps);
-            self.clearance(p, half) >= half - 2.0 * CHORD_ERROR_MM
+        let least = half - 2.0 * CHORD_ERROR_MM;
+        let [a, b] = way;
+        let near = AABB::from_corners(
+            [a.x.min(b.x) - half, a.y.min(b.y) - half],
+            [a.x.max(b.x) + half, a.y.max(b.y) + half],
+        );
+        let mut edges = self.edges.locate_in_envelope_intersecting(near);
+        edges.all(|edge| {
+            let (c, d) = ends(edge.geom());
+            let parts = match but {
+                Some((place, reach)) => beyond([c, d], place, reach),
+                None => [Some([c, d]), None],
+            };
+            let mut parts = parts.into_iter().flatten();
+            parts.all(|part| plane::between_segments(way, part) >= least)
         })
     }
 
@@ -246,9 +301,12 @@ impl Scrap {
         for length in [options.lead_in_mm.max(least), 1.5 * least, least] {
             for turn in WAYS {
                 let pierce = tail + Vec2::from_angle(turn + outwards.atan2()) * length;
-                // Near the tail the slit itself burns half a kerf to each side.
-                let end = tail.lerp(pierce, (kerf_mm / length).min(1.0));
-                if self.is_free(pierce, end, options.pierce_mm, kerf_mm) && !self.is_part(pierce) {
+                let hole = 0.5 * options.pierce_mm + CLEAR_MM;
+                let around_tail = Some((tail, AROUND_TAIL * 0.5 * kerf_mm));
+                if self.clearance(pierce, hole) >= hole
+                    && self.keeps_clear([pierce, tail], kerf_mm, around_tail)
+                    && !self.is_part(pierce)
+                {
                     return Some(Curve::line(pierce, tail));
                 }
             }
@@ -313,4 +371,98 @@ fn lead(along: Vec2, slant: f64, side: Side) -> Vec2 {
         Side::Left => -right,
     };
     aside * slant.sin() - along * slant.cos()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linkage::{Handedness, Linkage};
+    use crate::pattern::SheetOptions;
+
+    /// A plate with a corner of this angle cut into it from below, its vertex at the origin, its sides 50 mm long.
+    fn notched(angle_deg: f64) -> Scrap {
+        let linkage = Linkage::patch(20.0, Handedness::Right, &Linkage::hexagon_cells(1));
+        let mut sheet = Sheet::new(&linkage, &SheetOptions::plain(1.0, 0.2)).unwrap();
+        let tip = 50.0 * Vec2::from_angle(f64::to_radians(0.5 * angle_deg - 90.0));
+        let corners = [
+            (-tip.x, tip.y),
+            (0., 0.),
+            (tip.x, tip.y),
+            (tip.x, 30.),
+            (-tip.x, 30.),
+        ];
+        sheet.contours = vec![Contour {
+            line: Curve::polyline(corners.map(Point::from), true),
+            outer: true,
+        }];
+        Scrap::new(&sheet)
+    }
+
+    fn options(pierce_mm: f64) -> CutOptions {
+        let machine = crate::machine::load(crate::machine::DEFAULT).unwrap();
+        let material = crate::material::load(crate::material::DEFAULT).unwrap();
+        CutOptions {
+            pierce_mm,
+            lead_in_mm: 3.0,
+            ..CutOptions::of(&material.cut_for(&machine).unwrap(), &machine, None)
+        }
+    }
+
+    #[test]
+    fn a_way_to_the_rim_burns_no_more_of_it_than_its_slit_or_is_none() {
+        let kerf_mm = 0.2;
+        for (angle_deg, entered) in [(60.0, false), (90.0, false), (120.0, true), (180.0, true)] {
+            for slit_deg in [-30.0, 0.0, 30.0] {
+                let outwards = Vec2::from_angle(f64::to_radians(slit_deg - 90.0));
+                let scrap = notched(angle_deg);
+                let way = scrap.way_to_rim(Point::ORIGIN, outwards, &options(0.9), kerf_mm);
+                assert_eq!(way.is_some(), entered, "{angle_deg} {slit_deg}");
+                let Some(way) = way else { continue };
+                // Every place of the rim that the beam reaches is one that the slit reaches, to a hundredth of a
+                // millimetre and a half.
+                let side = Vec2::from_angle(f64::to_radians(0.5 * angle_deg - 90.0));
+                let line = way.flattened(CHORD_ERROR_MM);
+                for k in 0..200 {
+                    let along = 0.01 * f64::from(k);
+                    let rim = (side * along).to_point();
+                    if plane::from_segment(rim, line[0], line[1]) < 0.5 * kerf_mm - 0.004 {
+                        assert!(along < 0.5 * kerf_mm + 0.016, "{angle_deg}: {along}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_beam_that_passes_a_corner_between_two_points_touches_it() {
+        // The tip of a corner is 0.09 mm beside the middle of a way: half a kerf is 0.1, and its ends are far off.
+        let scrap = notched(60.0);
+        for (beside, clear) in [(0.09, false), (0.101, true)] {
+            for middle in [0.0, 0.013, 0.05] {
+                let tip = 50.0 * Vec2::from_angle(f64::to_radians(-60.0));
+                let (x, y) = (tip.x + middle, tip.y - beside);
+                let way = [Point::new(x - 0.2, y), Point::new(x + 0.2, y)];
+                let found = scrap.keeps_clear(way, 0.2, None);
+                assert_eq!(found, clear, "{beside} {middle}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_lies_beyond_a_circle_is_both_ends_or_all_or_nothing() {
+        let line = [Point::new(0.0, 0.0), Point::new(10.0, 0.0)];
+        let length = |place: (f64, f64), r: f64| -> Vec<f64> {
+            let parts = beyond(line, place.into(), r).into_iter().flatten();
+            parts.map(|[a, b]| a.distance(b)).collect()
+        };
+        assert_eq!(length((5.0, 3.0), 5.0), [1.0, 1.0]);
+        assert_eq!(length((0.0, 0.0), 4.0), [6.0]);
+        assert_eq!(length((12.0, 0.0), 4.0), [8.0]);
+        assert_eq!(length((5.0, 6.0), 5.0), [10.0]);
+        assert_eq!(length((30.0, 0.0), 5.0), [10.0]);
+        assert!(length((5.0, 0.0), 6.0).is_empty());
+        let spot = [line[0]; 2];
+        assert_eq!(beyond(spot, Point::new(1.0, 0.0), 2.0), [None, None]);
+        assert_eq!(beyond(spot, Point::new(3.0, 0.0), 2.0), [Some(spot), None]);
+    }
 }

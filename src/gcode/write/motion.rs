@@ -281,7 +281,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig { cases: 512, ..ProptestConfig::default() })]
+        #![proptest_config(crate::base::cases::cases(512))]
 
         #[test]
         fn an_arc_stays_within_its_tolerance_and_its_radii_agree(

@@ -288,7 +288,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(40))]
+        #![proptest_config(crate::base::cases::cases(40))]
         #[test]
         fn it_answers_as_the_tree_does_wherever_the_points_wander(
             which in 0usize..10,

@@ -179,7 +179,7 @@ fn ply_text_and_binary_say_the_same() {
 }
 
 proptest::proptest! {
-    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(300))]
+    #![proptest_config(crate::base::cases::cases(300))]
     /// Files with bytes changed, cut or doubled give an error or a soup, never a panic.
     #[test]
     fn damaged_files_do_not_panic(

@@ -646,7 +646,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(24))]
+        #![proptest_config(crate::base::cases::cases(24))]
 
         /// The step over triangles is the step of the matrix over points.
         #[test]
