@@ -157,7 +157,7 @@ pub fn tabs_by_outline(outlines: &[Curve], tabs: &[Tab]) -> Vec<Vec<Tab>> {
     for tab in tabs {
         let away = outlines.iter().map(|line| nearest(line, tab.at).0);
         if let Some((n, _)) = away.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)) {
-            all[n].push(tab.clone());
+            all[n].push(*tab);
         }
     }
     all
