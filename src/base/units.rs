@@ -21,6 +21,18 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
+/// A value rounded to so many decimals.
+pub fn rounded(value: f64, decimals: i32) -> f64 {
+    let factor = 10f64.powi(decimals);
+    (value * factor).round() / factor
+}
+
+/// A value rounded down to so many decimals: for a bound, which is never rounded up.
+pub fn floored(value: f64, decimals: i32) -> f64 {
+    let factor = 10f64.powi(decimals);
+    (value * factor).floor() / factor
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,6 +6,9 @@ use super::refusal::{Measure, Refusal};
 use super::scatter::{LAWS, Law};
 use crate::base::units::short;
 
+/// Confidences that can be asked for.
+pub const CONFIDENCES: std::ops::RangeInclusive<f64> = 0.5..=0.999;
+
 /// The share of the allowed risk that the posterior may use. The rest is for what it does not know: the prior of the spread
 /// ends somewhere, the law of scatter is one of two, the gauge has marks. Measured: with all of it, cells with a Weibull
 /// scatter of 8 % cover 0.87 of 0.9.
@@ -305,7 +308,7 @@ impl Calibration {
         demand: &Demand,
         confidence: f64,
     ) -> Result<Bound, Refusal> {
-        if !(0.5..=0.999).contains(&confidence) {
+        if !CONFIDENCES.contains(&confidence) {
             return Err(Refusal::Confidence { confidence });
         }
         if demand.groups.is_empty() || demand.hinges() <= 0.0 {

@@ -58,7 +58,7 @@ mod simulated;
 #[cfg(test)]
 mod tests;
 
-pub use bound::{Bound, Caution, Demand, StoppedBy};
+pub use bound::{Bound, CONFIDENCES, Caution, Demand, StoppedBy};
 pub use coupon::{
     Coupon, CouponError, CouponJob, CouponPlan, CouponWish, GAUGE_STEP, KerfPiece, MOST_STRIPS,
     SettingSquare, Strip, coupon,
@@ -68,7 +68,7 @@ pub use geometry::Geometry;
 pub use kerf::{Kerf, KerfError, KerfReading, Side, kerf};
 pub use next::{Candidate, NextStrip};
 pub(crate) use readings::{
-    Answer, Item, check_calipers, check_stretch, failure, items, number, pulled, yes,
+    Answer, Item, KERF_DECIMALS, check_calipers, check_stretch, failure, items, number, pulled, yes,
 };
 pub use readings::{Doubt, MeasuredPiece, Readings, TriedSetting, not_counted_yet, template};
 pub use refusal::{Measure, Refusal};

@@ -89,7 +89,8 @@ fn length(text: &str) -> Result<f64, String> {
     }
 }
 
-fn size(text: &str) -> Result<[f64; 2], String> {
+/// Width and height, `WIDTHxHEIGHT` in millimetres.
+pub(super) fn size(text: &str) -> Result<[f64; 2], String> {
     let wrong = || "width and height in millimetres, for example 300x200".to_owned();
     let (width, height) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
     let one = |part: &str| {

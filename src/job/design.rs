@@ -13,6 +13,7 @@ use super::request::{
     ConePlace, ConeWish, DartWish, FlapWish, Request, RimWish, SheetWish, Source,
 };
 use crate::base::document::{Complaint, Document, ranged};
+use crate::calibrate::CONFIDENCES;
 use crate::conformal::Sizing;
 use crate::linkage::Handedness;
 use crate::material::TipShape;
@@ -354,7 +355,12 @@ impl Design {
         }
         ranged("surface.mm_per_unit", self.surface.mm_per_unit, 1e-9, 1e9)?;
         if let Some(confidence) = self.sheet.confidence {
-            ranged("sheet.confidence", confidence, 0.5, 0.999)?;
+            ranged(
+                "sheet.confidence",
+                confidence,
+                *CONFIDENCES.start(),
+                *CONFIDENCES.end(),
+            )?;
         }
         ranged(
             "sheet.hinge_width_mm",

@@ -57,9 +57,9 @@ pub fn explore(
         let machine = crate::machine::load(&request.machine).map_err(MakeError::Machine)?;
         let setting = material.cut_for(&machine).map_err(MakeError::Cut)?;
         let options = stock(request, &material, &machine, &setting)?.options;
-        let (sizing, area_mm2) = (request.sizing, loaded.area_mm2());
-        sigma =
-            checked_sigma(strength.sigma(&options, material.thickness_mm, sizing, area_mm2)?)?;
+        if let Some(own) = strength.sigma(request, &options, &material, loaded.area_mm2())? {
+            sigma = checked_sigma(own)?;
+        }
     }
     let surface = &loaded.import.surface;
     // As `make` does: handles around which the pattern cannot close are opened where that is left to the program.

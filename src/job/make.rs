@@ -27,6 +27,7 @@ use super::{MakeError, remedy, tell};
 use crate::base::atomic;
 use crate::base::ids::Id as _;
 use crate::base::progress::Progress;
+use crate::calibrate::CONFIDENCES;
 use crate::conformal::{Cone, Dart, Flattened, Layout, Sizing};
 use crate::linkage::{write_glb, write_obj};
 use crate::machine::Machine;
@@ -177,15 +178,11 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
     progress.start("reading the surface", None);
     let loaded = load(request)?;
     stock.rim = loaded.rim(&stock.options);
-    if let Some(strength) = strength.as_ref().filter(|_| request.sigma.is_none()) {
-        let thickness_mm = material.thickness_mm;
-        let sigma = strength.sigma(
-            &stock.options,
-            thickness_mm,
-            request.sizing,
-            loaded.area_mm2(),
-        )?;
-        stock.sigma = checked_sigma(sigma)?;
+    if let Some(strength) = &strength {
+        let area_mm2 = loaded.area_mm2();
+        if let Some(sigma) = strength.sigma(request, &stock.options, &material, area_mm2)? {
+            stock.sigma = checked_sigma(sigma)?;
+        }
     }
     let surface = &loaded.import.surface;
     let targets = loaded.targets(&request.source);
@@ -418,13 +415,13 @@ pub(crate) fn stock<'a>(
         tab_width_mm: request.sheet.tab_width_mm,
     };
     if let Some(value) = stock.confidence
-        && !(0.5..=0.999).contains(&value)
+        && !CONFIDENCES.contains(&value)
     {
         return Err(MakeError::Range {
             what: "--confidence",
             value,
-            least: 0.5,
-            most: 0.999,
+            least: *CONFIDENCES.start(),
+            most: *CONFIDENCES.end(),
         });
     }
     check_sizing(request.sizing)?;

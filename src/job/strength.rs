@@ -12,7 +12,7 @@ use super::report::Margins;
 use super::request::Request;
 use super::shape::Fit;
 use super::verdict::{Reason, place};
-use crate::base::units::short;
+use crate::base::units::{floored, short};
 use crate::calibrate::{Bound, Calibration, Demand, FitOptions, Geometry, Refusal, StoppedBy, fit};
 use crate::conformal::Sizing;
 use crate::linkage::Linkage;
@@ -86,33 +86,36 @@ impl Strength {
         }
     }
 
-    /// The σ for a sheet that is not laid out yet, for a surface of this area.
+    /// The σ for a sheet that is not laid out yet, for a surface of this area; none where σ was given by hand.
     ///
     /// # Errors
     /// [`MakeError::Strength`]: the sheet is too far from the strips.
     pub fn sigma(
         &self,
+        request: &Request,
         options: &SheetOptions,
-        thickness_mm: f64,
-        sizing: Sizing,
+        material: &Material,
         area_mm2: f64,
-    ) -> Result<f64, MakeError> {
+    ) -> Result<Option<f64>, MakeError> {
+        if request.sigma.is_some() {
+            return Ok(None);
+        }
         let confidence = self.confidence.unwrap_or(CONFIDENCE);
         let mut sigma: f64 = 2.0;
         for _ in 0..TURNS {
-            let (edge_mm, triangles) = match sizing {
+            let (edge_mm, triangles) = match request.sizing {
                 // Closed, the most triangles cover it.
                 Sizing::EdgeMm(edge) => (edge, area_mm2 / (TRIANGLE * edge * edge)),
                 // All open to σ, the smallest do.
                 Sizing::Triangles(count) => ((area_mm2 / (TRIANGLE * count)).sqrt() / sigma, count),
             };
             let demand = Demand::all((HINGES_A_TRIANGLE * triangles).ceil().max(1.0) as usize);
-            let geometry = geometry(options, thickness_mm, edge_mm);
+            let geometry = geometry(options, material.thickness_mm, edge_mm);
             let bound = self.calibration.bound(&geometry, &demand, confidence);
             sigma = bound.map_err(|refusal| self.refused(refusal))?.sigma;
         }
         // Never up; four digits are what a person reads in the design.
-        Ok((1e4 * sigma).floor() / 1e4)
+        Ok(Some(floored(sigma, 4)))
     }
 
     fn refused(&self, refusal: Refusal) -> MakeError {
@@ -262,7 +265,7 @@ impl Proof {
                         short(worst.opening, 4),
                         place(*at),
                         chance(proved.survival),
-                        short((1e3 * proved.bound.sigma).floor() / 1e3, 3),
+                        short(floored(proved.bound.sigma, 3), 3),
                         self.confidence,
                     ),
                     at_mm: Some((*at).into()),
@@ -278,7 +281,7 @@ impl Proof {
             self.confidence,
             self.strips,
             proved.margins.len(),
-            short((1e4 * proved.bound.sigma).floor() / 1e4, 4)
+            short(floored(proved.bound.sigma, 4), 4)
         )
     }
 

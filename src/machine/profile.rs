@@ -6,7 +6,7 @@ use super::controller::{Controller, ControllerLimits};
 use super::lines::{self, Where};
 use super::tool::{LaserTool, PlasmaTool, Tool};
 use crate::base::document::{Complaint, ranged};
-use crate::material::{check_format, check_name};
+use crate::material::{FORMAT, check_format, check_name};
 
 /// The corner of the bed where X and Y are zero, seen by a person in front of the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -228,7 +228,7 @@ impl Machine {
     /// # Errors
     /// The first [`Complaint`], with the key.
     pub fn validate(&self) -> Result<(), Complaint> {
-        check_format(self.format)?;
+        check_format(self.format, FORMAT)?;
         check_name(&self.name)?;
         if let Some(limits) = &self.controller_limits {
             limits.check(self.controller)?;

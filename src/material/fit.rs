@@ -211,6 +211,41 @@ impl Material {
     /// # Errors
     /// [`CutError`] says what is missing and what to change.
     pub fn cut_for(&self, machine: &Machine) -> Result<CutSetting, CutError> {
+        let (tool, best) = self.chosen(machine)?;
+        Ok(CutSetting {
+            process: tool.process(),
+            speed_mm_per_min: best.speed_mm_per_min,
+            power_percent: match tool {
+                Tool::Laser(laser) => best.strength() / laser.watts * 100.0,
+                Tool::Plasma(_) => 100.0,
+            },
+            passes: best.passes.unwrap_or(1),
+            pass_order: best.pass_order.unwrap_or_default(),
+            air_assist: best.air_assist.unwrap_or(false),
+            kerf_mm: best.kerf_mm,
+            pierce_diameter_mm: best.pierce_diameter_mm.unwrap_or(best.kerf_mm),
+            lead_in_mm: best.lead_in_mm.unwrap_or(0.0),
+            lead_out_mm: best.lead_out_mm.unwrap_or(0.0),
+            overcut_mm: best.overcut_mm.unwrap_or(0.0),
+            torch: torch_setting(best),
+            source: best.source,
+            note: best.note.clone(),
+        })
+    }
+
+    /// The number, from 0, of the `[[cut]]` that [`Material::cut_for`] takes for a machine.
+    ///
+    /// # Errors
+    /// As [`Material::cut_for`].
+    pub fn cut_entry_for(&self, machine: &Machine) -> Result<usize, CutError> {
+        let (_, best) = self.chosen(machine)?;
+        // It is one of them.
+        let place = self.cut.iter().position(|c| std::ptr::eq(c, best));
+        Ok(place.unwrap_or(0))
+    }
+
+    /// The machine's tool, and the entry for it that the machine can follow.
+    fn chosen<'a>(&'a self, machine: &'a Machine) -> Result<(Tool<'a>, &'a CutEntry), CutError> {
         let Some(tool) = machine.tool() else {
             return Err(CutError::NoTool {
                 machine: machine.name.clone(),
@@ -239,9 +274,8 @@ impl Material {
                 speed_mm_per_min: best.speed_mm_per_min,
             });
         }
-        let air_assist = best.air_assist.unwrap_or(false);
         if let Tool::Laser(laser) = tool
-            && air_assist
+            && best.air_assist.unwrap_or(false)
             && laser.air_on.is_none()
         {
             return Err(CutError::NoAir {
@@ -249,50 +283,7 @@ impl Material {
                 material: self.name.clone(),
             });
         }
-        Ok(CutSetting {
-            process,
-            speed_mm_per_min: best.speed_mm_per_min,
-            power_percent: match tool {
-                Tool::Laser(laser) => best.strength() / laser.watts * 100.0,
-                Tool::Plasma(_) => 100.0,
-            },
-            passes: best.passes.unwrap_or(1),
-            pass_order: best.pass_order.unwrap_or_default(),
-            air_assist,
-            kerf_mm: best.kerf_mm,
-            pierce_diameter_mm: best.pierce_diameter_mm.unwrap_or(best.kerf_mm),
-            lead_in_mm: best.lead_in_mm.unwrap_or(0.0),
-            lead_out_mm: best.lead_out_mm.unwrap_or(0.0),
-            overcut_mm: best.overcut_mm.unwrap_or(0.0),
-            torch: torch_setting(best),
-            source: best.source,
-            note: best.note.clone(),
-        })
-    }
-
-    /// The number, from 0, of the `[[cut]]` that [`Material::cut_for`] takes for a machine.
-    ///
-    /// # Errors
-    /// As [`Material::cut_for`].
-    pub fn cut_entry_for(&self, machine: &Machine) -> Result<usize, CutError> {
-        let setting = self.cut_for(machine)?;
-        let entries: Vec<&CutEntry> = self
-            .cut
-            .iter()
-            .filter(|c| c.process == setting.process)
-            .collect();
-        let best = match machine.tool() {
-            Some(Tool::Laser(laser)) => self.for_laser(machine, laser, &entries)?,
-            Some(Tool::Plasma(torch)) => self.for_torch(machine, torch, &entries)?,
-            None => {
-                return Err(CutError::NoTool {
-                    machine: machine.name.clone(),
-                });
-            }
-        };
-        // It is one of them.
-        let place = self.cut.iter().position(|c| std::ptr::eq(c, best));
-        Ok(place.unwrap_or(0))
+        Ok((tool, best))
     }
 
     fn for_laser<'a>(

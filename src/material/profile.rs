@@ -128,14 +128,14 @@ pub struct Material {
 /// The version of the profile format that this build reads.
 pub(crate) const FORMAT: u32 = 1;
 
-/// Checks the version key of a profile.
-pub(crate) fn check_format(format: u32) -> Result<(), Complaint> {
-    if format == FORMAT {
+/// Checks the version key of a document against the one that this build reads.
+pub(crate) fn check_format(format: u32, reads: u32) -> Result<(), Complaint> {
+    if format == reads {
         return Ok(());
     }
     Err(Complaint::new(
         "format",
-        format!("is {format}, and this build of kagome reads format {FORMAT}"),
+        format!("is {format}, and this build of kagome reads format {reads}"),
     ))
 }
 
@@ -174,7 +174,7 @@ impl Material {
     /// # Errors
     /// The first [`Complaint`], with the key.
     pub fn validate(&self) -> Result<(), Complaint> {
-        check_format(self.format)?;
+        check_format(self.format, FORMAT)?;
         check_name(&self.name)?;
         ranged("thickness_mm", self.thickness_mm, 0.01, 50.0)?;
         ranged("hinge_width_mm", self.hinge_width_mm, 0.02, 50.0)?;

@@ -53,7 +53,7 @@ pub fn neck_mm(hinge_width_mm: f64, kerf_mm: f64, tip_radius_mm: f64) -> f64 {
 }
 
 /// More hinges than this are no strip to be pulled by hand.
-const MOST_HINGES: u32 = 100_000;
+pub(crate) const MOST_HINGES: u32 = 100_000;
 
 impl Reading {
     /// What messages call it: its name, or its number in the list from 1.

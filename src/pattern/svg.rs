@@ -10,7 +10,7 @@ use svg::node::element::{Circle, Group, Path};
 use super::mark::MarkKind;
 use super::sheet::{Sheet, Tip};
 use crate::base::curve::Curve;
-use crate::base::units::{fixed, short};
+use crate::base::units::{fixed, rounded, short};
 
 /// A tenth of a micrometre: a hundredth of what the verifier tolerates.
 const DECIMALS: usize = 4;
@@ -42,7 +42,7 @@ pub(super) const FLAP: &str = "flap";
 /// The sheet as SVG text.
 pub fn svg(sheet: &Sheet) -> String {
     // Rounded first, so that the page fits what is written and not what was meant.
-    let round = |v: f64| (v * 1e4).round() / 1e4;
+    let round = |v: f64| rounded(v, DECIMALS as i32);
     let b = sheet.bounds();
     let bounds = Rect::new(round(b.x0), round(b.y0), round(b.x1), round(b.y1));
     // Room for half the cut and a stroke.

@@ -115,13 +115,16 @@ impl Scrap {
         crossed.count() % 2 == 1
     }
 
-    /// Whether the straight way from a pierce to a point of the outline stays in scrap, hole and beam and all.
-    fn is_free(&self, pierce: Point, to: Point, hole_mm: f64, kerf_mm: f64) -> bool {
+    /// Whether the straight way from a pierce stays in scrap, hole and beam and all; `but` as [`Self::keeps_clear`] has it.
+    fn is_free(
+        &self,
+        way: [Point; 2],
+        hole_mm: f64,
+        kerf_mm: f64,
+        but: Option<(Point, f64)>,
+    ) -> bool {
         let hole = 0.5 * hole_mm + CLEAR_MM;
-        if self.clearance(pierce, hole) < hole {
-            return false;
-        }
-        self.keeps_clear([pierce, to], kerf_mm, None)
+        self.clearance(way[0], hole) >= hole && self.keeps_clear(way, kerf_mm, but)
     }
 
     /// Whether a beam along a segment touches no finished edge, or none farther from a place than a distance: there
@@ -198,7 +201,7 @@ impl Scrap {
             for (index, piece) in &pieces {
                 let (at, along) = (piece.at(0.5), piece.direction(0.5));
                 let pierce = at + lead(along, slant, side) * length;
-                if self.is_free(pierce, at, options.pierce_mm, kerf_mm) {
+                if self.is_free([pierce, at], options.pierce_mm, kerf_mm, None) {
                     let line = outline.opened_at(*index, 0.5);
                     let lead_out = self.leave(&line, along, options, kerf_mm, side);
                     let lead_in = Some(Curve::line(pierce, at));
@@ -243,7 +246,7 @@ impl Scrap {
                     continue;
                 };
                 let pierce = first.from + lead(first.direction(0.0), slant, side) * length;
-                if self.is_free(pierce, first.from, options.pierce_mm, kerf_mm) {
+                if self.is_free([pierce, first.from], options.pierce_mm, kerf_mm, None) {
                     return Ok((Some(Curve::line(pierce, first.from)), line.clone()));
                 }
             }
@@ -277,7 +280,8 @@ impl Scrap {
             // The way in, mirrored.
             let found = SLANTS.iter().find_map(|slant| {
                 let out = end - lead(along, *slant, side.other()) * options.lead_out_mm;
-                self.is_free(out, end, kerf_mm, kerf_mm).then_some(out)
+                self.is_free([out, end], kerf_mm, kerf_mm, None)
+                    .then_some(out)
             });
             if let Some(out) = found {
                 way.join(&Curve::line(end, out));
@@ -301,10 +305,8 @@ impl Scrap {
         for length in [options.lead_in_mm.max(least), 1.5 * least, least] {
             for turn in WAYS {
                 let pierce = tail + Vec2::from_angle(turn + outwards.atan2()) * length;
-                let hole = 0.5 * options.pierce_mm + CLEAR_MM;
                 let around_tail = Some((tail, AROUND_TAIL * 0.5 * kerf_mm));
-                if self.clearance(pierce, hole) >= hole
-                    && self.keeps_clear([pierce, tail], kerf_mm, around_tail)
+                if self.is_free([pierce, tail], options.pierce_mm, kerf_mm, around_tail)
                     && !self.is_part(pierce)
                 {
                     return Some(Curve::line(pierce, tail));

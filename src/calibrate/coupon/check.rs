@@ -1,13 +1,8 @@
 //! `coupon.toml` read back, with its checks.
 
-use super::Coupon;
+use super::{Coupon, FORMAT};
 use crate::base::document::{Complaint, Document, DocumentError, ranged};
-
-/// The version of `coupon.toml`.
-const FORMAT: u32 = 1;
-
-/// More hinges than this are no strip to be pulled by hand.
-const MOST_HINGES: u32 = 100_000;
+use crate::material::{MOST_HINGES, check_format};
 
 impl Coupon {
     /// From the text of a `coupon.toml`; `file` is what messages call it.
@@ -23,15 +18,7 @@ impl Coupon {
     /// # Errors
     /// The first [`Complaint`], with the key.
     pub fn validate(&self) -> Result<(), Complaint> {
-        if self.format != FORMAT {
-            return Err(Complaint::new(
-                "format",
-                format!(
-                    "is {}, and this build of kagome reads format {FORMAT}",
-                    self.format
-                ),
-            ));
-        }
+        check_format(self.format, FORMAT)?;
         for (key, name) in [("material", &self.material), ("machine", &self.machine)] {
             check_word(key, name)?;
         }
@@ -63,13 +50,7 @@ impl Coupon {
         for (i, square) in self.setting.iter().enumerate() {
             let key = |k: &str| format!("setting[{i}].{k}");
             check_name(&key("name"), &square.name, &mut names)?;
-            ranged(&key("power_percent"), square.power_percent, 0.01, 100.0)?;
-            ranged(
-                &key("speed_mm_per_min"),
-                square.speed_mm_per_min,
-                0.1,
-                200_000.0,
-            )?;
+            check_setting(&key, square.power_percent, square.speed_mm_per_min)?;
         }
         Ok(())
     }
@@ -102,6 +83,16 @@ fn check_name<'a>(key: &str, name: &'a str, names: &mut Vec<&'a str>) -> Result<
     }
     names.push(name);
     Ok(())
+}
+
+/// Power and speed of a square of the grid; `key` makes a key of a name.
+pub(crate) fn check_setting(
+    key: &dyn Fn(&str) -> String,
+    power_percent: f64,
+    speed_mm_per_min: f64,
+) -> Result<(), Complaint> {
+    ranged(&key("power_percent"), power_percent, 0.01, 100.0)?;
+    ranged(&key("speed_mm_per_min"), speed_mm_per_min, 0.1, 200_000.0)
 }
 
 #[cfg(test)]

@@ -13,7 +13,12 @@ use serde::{Deserialize, Serialize};
 
 use super::kerf::Side;
 
+pub(super) use check::check_setting;
+
 pub use plan::{CouponError, CouponJob, CouponPlan, CouponWish, GAUGE_STEP, MOST_STRIPS, coupon};
+
+/// The version of `coupon.toml`.
+const FORMAT: u32 = 1;
 
 /// What was cut: `coupon.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

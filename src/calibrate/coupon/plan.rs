@@ -7,11 +7,12 @@
 use kurbo::{Point, Rect};
 
 use super::comb::{card, kerf_plate, setting_plate};
-use super::{Coupon, Strip};
+use super::{Coupon, FORMAT, Strip};
+use crate::base::units::rounded;
 use crate::machine::{HeightControl, Machine};
 use crate::material::{CutError, CutSetting, Material, neck_mm};
 use crate::pattern::{PatternError, Sheet, SheetOptions, StockArea, Tip, nest};
-use crate::toolpath::{CutOptions, Role, Toolpath, ToolpathError, plan};
+use crate::toolpath::{Cut, CutOptions, Role, Toolpath, ToolpathError, plan};
 
 /// Widths of the hinges, in the material's own.
 const WIDTHS: [f64; 3] = [0.7, 1.0, 1.4];
@@ -111,8 +112,8 @@ pub enum CouponError {
 pub struct CouponJob {
     /// `settings`, `kerf` or `strips`: also the name of its file.
     pub name: &'static str,
-    /// The parts, each in its place.
-    pub parts: Vec<Sheet>,
+    /// The parts, each in its place, with its own cuts.
+    pub parts: Vec<(Sheet, Toolpath)>,
     /// All of them, with the narrowest hinge for theirs.
     pub sheet: Sheet,
     /// The cuts, in order.
@@ -190,7 +191,8 @@ fn strips(shapes: &SheetOptions, wish: &CouponWish) -> Result<Vec<Strip>, Coupon
         &wish.hinge_widths_mm,
         WIDTHS
             .iter()
-            .map(|w| rounded(w * shapes.hinge_width_mm))
+            // A width that a person can read.
+            .map(|w| rounded(w * shapes.hinge_width_mm, 2))
             .collect(),
     );
     let edges = or(
@@ -231,11 +233,6 @@ fn strips(shapes: &SheetOptions, wish: &CouponWish) -> Result<Vec<Strip>, Coupon
         }
     }
     Ok(strips)
-}
-
-/// A width that a person can read: hundredths of a millimetre.
-fn rounded(width_mm: f64) -> f64 {
-    (width_mm * 100.0).round() / 100.0
 }
 
 /// Everything on a coupon, drawn; not yet in its place.
@@ -284,7 +281,7 @@ impl Parts {
             card: card(strips, GAUGE_STEP, shapes),
             engraved,
             coupon: Coupon {
-                format: 1,
+                format: FORMAT,
                 material: material.name.clone(),
                 machine: machine.name.clone(),
                 thickness_mm: material.thickness_mm,
@@ -354,9 +351,16 @@ impl Placed<'_> {
         let options = CutOptions::of(setting, machine, marks.as_ref());
         let job = |name: &'static str, parts: Vec<Sheet>| -> Result<CouponJob, CouponError> {
             let failed = |source| CouponError::Toolpath { job: name, source };
+            let sheet = merged(&parts, shapes);
+            let parts = planned(parts, &options, machine.park_mm()).map_err(failed)?;
+            let toolpaths = parts.iter().map(|part| part.1.clone());
             Ok(CouponJob {
-                toolpath: together(&parts, &options, machine.park_mm()).map_err(failed)?,
-                sheet: merged(&parts, shapes),
+                // No job is without parts.
+                toolpath: together(toolpaths).map_or_else(
+                    || plan(&sheet, &options, machine.park_mm()).map_err(failed),
+                    Ok,
+                )?,
+                sheet,
                 name,
                 parts,
             })
@@ -444,31 +448,32 @@ fn merged(parts: &[Sheet], shapes: &SheetOptions) -> Sheet {
     sheet
 }
 
-/// The cuts of all parts, each planned with its own hinges; marks of all before slits of all, rims last.
-fn together(
-    parts: &[Sheet],
+/// Every part with its cuts, each planned with its own hinges for a head that comes from the part before.
+fn planned(
+    parts: Vec<Sheet>,
     options: &CutOptions,
     start: [f64; 2],
-) -> Result<Toolpath, ToolpathError> {
-    let mut whole: Option<Toolpath> = None;
+) -> Result<Vec<(Sheet, Toolpath)>, ToolpathError> {
     let mut at = start;
-    for part in parts {
-        let planned = plan(part, options, at)?;
-        if let Some(end) = planned.cuts.last().and_then(crate::toolpath::Cut::end) {
+    let one = |part: Sheet| {
+        let toolpath = plan(&part, options, at)?;
+        if let Some(end) = toolpath.cuts.last().and_then(Cut::end) {
             at = [end.x, end.y];
         }
-        match &mut whole {
-            Some(all) => all.cuts.extend(planned.cuts),
-            None => whole = Some(planned),
-        }
-    }
-    let mut whole = match whole {
-        Some(whole) => whole,
-        None => plan(&Sheet::together([]), options, start)?,
+        Ok((part, toolpath))
     };
+    parts.into_iter().map(one).collect()
+}
+
+/// The cuts of all parts: marks of all before slits of all, rims last.
+fn together(parts: impl Iterator<Item = Toolpath>) -> Option<Toolpath> {
+    let mut whole = parts.reduce(|mut all, part| {
+        all.cuts.extend(part.cuts);
+        all
+    })?;
     // Stable: within a role part after part.
     whole.cuts.sort_by_key(|cut| cut.role);
-    Ok(whole)
+    Some(whole)
 }
 
 /// Gives every square of the grid its power and speed.

@@ -8,6 +8,7 @@ use super::paper::{Paper, Row};
 use super::words::{self, Pulled, Wrong};
 use super::{FORMAT, MeasuredPiece, Readings, TriedSetting};
 use crate::base::document::DocumentError;
+use crate::base::units::rounded;
 use crate::calibrate::coupon::{Coupon, KerfPiece, SettingSquare, Strip};
 use crate::calibrate::kerf::{KerfError, kerf};
 use crate::material::{Reading, check_date};
@@ -227,10 +228,8 @@ impl Readings {
     }
 }
 
-/// A ten-thousandth of a millimetre, so that a measured kerf is a number to be read.
-fn rounded(mm: f64) -> f64 {
-    (mm * 1e4).round() / 1e4
-}
+/// Ten-thousandths of a millimetre, so that a measured kerf is a number to be read.
+pub(crate) const KERF_DECIMALS: i32 = 4;
 
 fn put_together(found: &[Found<'_>], coupon: &Coupon, date: &str) -> Result<Readings, Refused> {
     let (mut pieces, mut places, mut setting) = (Vec::new(), Vec::new(), Vec::new());
@@ -267,9 +266,11 @@ fn put_together(found: &[Found<'_>], coupon: &Coupon, date: &str) -> Result<Read
         let reading = Reading {
             strip: Some(strip.name.clone()),
             date: found.date.clone().unwrap_or_else(|| date.to_owned()),
-            hinge_width_mm: rounded(strip.hinge_width_mm + more),
+            hinge_width_mm: rounded(strip.hinge_width_mm + more, KERF_DECIMALS),
             kerf_mm,
-            tip_radius_mm: coupon.tip_radius_mm.map(|r| rounded(r - 0.5 * more)),
+            tip_radius_mm: coupon
+                .tip_radius_mm
+                .map(|r| rounded(r - 0.5 * more, KERF_DECIMALS)),
             thickness_mm: coupon.thickness_mm,
             edge_mm: strip.edge_mm,
             hinges: strip.hinges,
@@ -308,7 +309,7 @@ fn put_together(found: &[Found<'_>], coupon: &Coupon, date: &str) -> Result<Read
 fn measured(pieces: &[MeasuredPiece], places: &[usize]) -> Result<Option<f64>, Refused> {
     let readings: Vec<_> = pieces.iter().map(MeasuredPiece::reading).collect();
     match kerf(&readings, CONFIDENCE) {
-        Ok(found) => Ok(Some(rounded(found.kerf_mm))),
+        Ok(found) => Ok(Some(rounded(found.kerf_mm, KERF_DECIMALS))),
         Err(KerfError::TooFew { .. }) => Ok(None),
         Err(error) => {
             let item = match error {

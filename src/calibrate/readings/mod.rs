@@ -15,13 +15,13 @@ mod tests;
 use serde::{Deserialize, Serialize};
 
 pub use doubt::Doubt;
-pub(crate) use merge::{Answer, Item, items};
+pub(crate) use merge::{Answer, Item, KERF_DECIMALS, items};
 pub(crate) use words::{check_calipers, check_stretch, failure, number, pulled, yes};
 
-use super::coupon::Coupon;
+use super::coupon::{Coupon, check_setting};
 use super::kerf::{Kerf, KerfError, KerfReading, Side, kerf};
 use crate::base::document::{Complaint, Document, DocumentError, ranged};
-use crate::material::{Reading, check_date};
+use crate::material::{Reading, check_date, check_format};
 
 /// The version of `readings.toml`.
 const FORMAT: u32 = 1;
@@ -136,15 +136,7 @@ impl Readings {
     /// # Errors
     /// The first [`Complaint`], with the key.
     pub fn validate(&self) -> Result<(), Complaint> {
-        if self.format != FORMAT {
-            return Err(Complaint::new(
-                "format",
-                format!(
-                    "is {}, and this build of kagome reads format {FORMAT}",
-                    self.format
-                ),
-            ));
-        }
+        check_format(self.format, FORMAT)?;
         for (key, name) in [("material", &self.material), ("machine", &self.machine)] {
             if name.trim().is_empty() {
                 return Err(Complaint::new(key, "is empty"));
@@ -169,13 +161,7 @@ impl Readings {
         }
         for (i, square) in self.setting.iter().enumerate() {
             let key = |k: &str| format!("setting[{i}].{k}");
-            ranged(&key("power_percent"), square.power_percent, 0.01, 100.0)?;
-            ranged(
-                &key("speed_mm_per_min"),
-                square.speed_mm_per_min,
-                0.1,
-                200_000.0,
-            )?;
+            check_setting(&key, square.power_percent, square.speed_mm_per_min)?;
         }
         Ok(())
     }

@@ -8,6 +8,7 @@ use crate::base::atomic::{check_directory, write_directory};
 use crate::base::units::short;
 use crate::calibrate::CouponWish;
 use crate::cli::profiles::{machine_named, material_named};
+use crate::cli::sheet_args::size;
 use crate::cli::{Failure, Global, Terminal, print, print_json};
 use crate::job::{COUPON_FILES, MakeError, make_coupon};
 
@@ -26,8 +27,8 @@ pub(super) struct CouponArgs {
     #[arg(long, value_name = "NAME|FILE", default_value = crate::material::DEFAULT)]
     material: String,
     /// Size of the piece in the bed's corner, millimetres [default: the material's, else the bed]
-    #[arg(long, value_name = "WxH")]
-    stock: Option<String>,
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    stock: Option<[f64; 2]>,
     /// Widths of the hinges, millimetres [default: 0.7, 1 and 1.4 of the material's own]
     #[arg(long, value_name = "MM,MM", value_delimiter = ',')]
     hinge_width: Vec<f64>,
@@ -47,10 +48,6 @@ pub(super) struct CouponArgs {
 /// # Errors
 /// [`Failure::No`] if a job is not good, [`Failure::Bad`] for profiles or sizes that cannot be used; nothing is written then.
 pub(super) fn run(args: &CouponArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
-    let stock_mm = match &args.stock {
-        Some(text) => Some(size(text)?),
-        None => None,
-    };
     let machine = machine_named(&args.machine).map_err(Failure::bad)?;
     let material = material_named(&args.material).map_err(Failure::bad)?;
     let folder = match &args.output {
@@ -72,7 +69,7 @@ pub(super) fn run(args: &CouponArgs, global: &Global, terminal: &Terminal) -> Re
     let wish = CouponWish {
         hinge_widths_mm: args.hinge_width.clone(),
         edges_mm: args.edge.clone(),
-        stock_mm,
+        stock_mm: args.stock,
     };
     let made = make_coupon(&wish, &machine, &material, terminal)
         .map_err(|e: MakeError| Failure::bad(e))?;
@@ -121,20 +118,4 @@ pub(super) fn run(args: &CouponArgs, global: &Global, terminal: &Terminal) -> Re
             .collect::<Vec<_>>()
             .join(", "),
     ))
-}
-
-/// `WxH`, millimetres.
-fn size(text: &str) -> Result<[f64; 2], Failure> {
-    let number = |part: &str| {
-        let value: Option<f64> = part.trim().parse().ok();
-        value.filter(|v| (1.0..=100_000.0).contains(v))
-    };
-    let sizes = text
-        .split_once(['x', 'X', '×'])
-        .and_then(|(w, h)| Some([number(w)?, number(h)?]));
-    sizes.ok_or_else(|| {
-        Failure::Bad(format!(
-            "--stock {text:?}: give width and height in millimetres, as 300x200"
-        ))
-    })
 }

@@ -10,7 +10,7 @@ use super::record::text_of;
 use super::upgrade::{Base, base, measured};
 use crate::base::progress::Progress as _;
 use crate::base::units::short;
-use crate::calibrate::{Geometry, Readings, not_counted_yet};
+use crate::calibrate::{CONFIDENCES, Geometry, Readings, not_counted_yet};
 use crate::cli::profiles::machine_named;
 use crate::cli::{Failure, Global, Terminal, print, print_json};
 use crate::machine;
@@ -53,10 +53,12 @@ pub(super) struct FitArgs {
 }
 
 pub(super) fn run(args: &FitArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
-    if !(0.5..=0.999).contains(&args.confidence) {
+    if !CONFIDENCES.contains(&args.confidence) {
         return Err(Failure::Bad(format!(
-            "a confidence of {} is not between 0.5 and 0.999",
-            args.confidence
+            "a confidence of {} is not between {} and {}",
+            args.confidence,
+            CONFIDENCES.start(),
+            CONFIDENCES.end()
         )));
     }
     let all = read(args)?;

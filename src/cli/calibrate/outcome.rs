@@ -2,13 +2,16 @@
 
 use serde::Serialize;
 
-use crate::base::units::short;
+use crate::base::units::{floored, short};
 use crate::calibrate::{
     Bound, Calibration, Candidate, Demand, FitOptions, Gauge, Geometry, Kerf, LAWS, Readings,
     Refusal, StoppedBy, TriedSetting, fit,
 };
 use crate::cli::Failure;
 use crate::material::Reading;
+
+/// Decimals of a σ in a profile, rounded down.
+pub(super) const SIGMA_DECIMALS: i32 = 3;
 
 /// The sheet for which a profile's `sigma.max` is stated.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -203,7 +206,7 @@ impl Strips {
         if let Some(bound) = &self.bound {
             lines.push(format!(
                 "{material}: σ = {} with confidence {confidence}",
-                short(floored(bound.sigma), 3)
+                short(floored(bound.sigma, SIGMA_DECIMALS), 3)
             ));
             lines.push(format!("  for {}", sheet_words(&self.reference)));
             lines.push(format!(
@@ -243,9 +246,4 @@ impl Next {
                 .map_or(String::new(), |now| format!(", now {}", short(now, 3)))
         )
     }
-}
-
-/// Down to a thousandth: a bound is never rounded up.
-pub(super) fn floored(sigma: f64) -> f64 {
-    (sigma * 1000.0).floor() / 1000.0
 }

@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::outcome::{Machined, Strips, floored, sheet_words};
+use super::outcome::{Machined, SIGMA_DECIMALS, Strips, sheet_words};
 use crate::base::atomic::write_file;
-use crate::base::units::short;
+use crate::base::units::{floored, rounded, short};
+use crate::calibrate::KERF_DECIMALS;
 use crate::cli::Failure;
 use crate::cli::profiles::{machine_named, material_named, own_folder};
 use crate::machine;
@@ -89,11 +90,6 @@ fn same_file(a: &Path, b: &Path) -> bool {
     }
 }
 
-/// A kerf to a hundredth of what calipers show.
-fn rounded(mm: f64) -> f64 {
-    (mm * 1e4).round() / 1e4
-}
-
 /// What goes into a profile, and what is to be told about it.
 pub(super) fn measured(
     base: &Base,
@@ -106,7 +102,7 @@ pub(super) fn measured(
 ) -> (Measured, Vec<String>) {
     let mut notes = Vec::new();
     let sigma = strips.and_then(|s| {
-        let max = floored(s.bound.as_ref()?.sigma);
+        let max = floored(s.bound.as_ref()?.sigma, SIGMA_DECIMALS);
         let same = fresh.is_empty() && (max - base.material.sigma.max).abs() < 5e-4;
         (!same).then(|| {
             let note = format!(
@@ -158,7 +154,7 @@ fn cut(
     let mut words = Vec::new();
     let kerf_mm = own
         .kerf
-        .map(|k| rounded(k.kerf_mm))
+        .map(|k| rounded(k.kerf_mm, KERF_DECIMALS))
         .filter(|&kerf| kerf != old.kerf_mm || old.source != material::Source::Measured);
     if let (Some(kerf_mm), Some(kerf)) = (kerf_mm, &own.kerf) {
         words.push(format!(

@@ -7,16 +7,16 @@ use crate::calibrate::CouponPlan;
 use crate::job::report::{escape, svg_element};
 use crate::machine::Machine;
 use crate::material::Material;
-use crate::pattern::{Sheet, svg};
 
 const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;max-width:190mm;margin:8mm auto;padding:0 4mm;color:#111}\
 h1{font-size:22px}h2{font-size:17px;margin-top:1.4em}table{border-collapse:collapse}td,th{border:1px solid #999;padding:2px 8px;text-align:left}\
 td:empty{min-width:18mm}figure{margin:1em 0}figure.plan svg{width:100%;height:auto;max-height:150mm}figure.plan path,figure.plan circle{vector-effect:non-scaling-stroke;stroke-width:.8px}\
 @media print{h2{break-after:avoid}figure,tr{break-inside:avoid}}";
 
-/// The page.
+/// The page; `drawing` is the SVG of all parts in their places.
 pub(super) fn html(
     plan: &CouponPlan,
+    drawing: &str,
     material: &Material,
     machine: &Machine,
     machine_s: f64,
@@ -35,11 +35,10 @@ pub(super) fn html(
         short((machine_s / 60.0).ceil(), 0),
     );
     steps(&mut out, plan);
-    let whole = svg(&Sheet::together(plan.jobs.iter().map(|j| j.sheet.clone())));
     let _ = writeln!(
         out,
         "<h2>Where everything is</h2><figure class=\"plan\">{}</figure>",
-        svg_element(&whole).unwrap_or_default()
+        svg_element(drawing).unwrap_or_default()
     );
     out.push_str("<h2>Strips</h2><table><tr><th>strip</th><th>hinge, mm</th><th>edge, mm</th><th>hinges</th><th>mark to mark, mm</th><th>held at</th><th>tore at</th><th>torn or plastic</th></tr>\n");
     for strip in &coupon.strip {

@@ -12,7 +12,6 @@ use crate::gcode;
 use crate::machine::Machine;
 use crate::material::{CutSetting, Material};
 use crate::pattern::{Sheet, svg};
-use crate::toolpath::{CutOptions, plan};
 
 /// What a coupon's folder may hold; `readings.toml` is written into it later.
 pub const COUPON_FILES: [&str; 11] = [
@@ -83,7 +82,7 @@ pub fn make_coupon(
         plan.jobs.iter().map(|job| job.sheet.clone()),
     ));
     let document = toml::to_string(&plan.coupon).unwrap_or_default();
-    let page = guide::html(&plan, &material, &machine, machine_s);
+    let page = guide::html(&plan, &whole, &material, &machine, machine_s);
     files.push(("coupon.toml", document.into_bytes()));
     files.push(("coupon.svg", whole.into_bytes()));
     files.push(("readings.csv", template(&plan.coupon).into_bytes()));
@@ -116,12 +115,9 @@ fn proved(
         setting,
         progress,
     )?;
-    let marks = material.mark_for(machine);
-    let options = CutOptions::of(setting, machine, marks.as_ref());
-    for part in &job.parts {
+    for (part, alone) in &job.parts {
         progress.check()?;
-        let alone = plan(part, &options, machine.park_mm()).map_err(MakeError::Toolpath)?;
-        let text = gcode::write(&alone, machine, material).map_err(MakeError::Gcode)?;
+        let text = gcode::write(alone, machine, material).map_err(MakeError::Gcode)?;
         let proof = gcode::verify(&text, machine, Some(part), Some(setting.passes))
             .map_err(MakeError::Toolpath)?;
         let findings = proof.findings.iter().map(ToString::to_string);
