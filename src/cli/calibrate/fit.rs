@@ -15,6 +15,7 @@ use crate::cli::profiles::machine_named;
 use crate::cli::{Failure, Global, Terminal, print, print_json};
 use crate::machine;
 use crate::material::Reading;
+use crate::pattern::Tip;
 
 /// Arguments of `kagome calibrate fit`.
 #[derive(Args, Clone, Debug)]
@@ -244,7 +245,7 @@ fn reference(
         .or_else(set)
         .or_else(|| middle(pulled.iter().map(|r| r.kerf_mm)))
         .unwrap_or(0.2);
-    let radius = material.tip.and_then(|t| t.radius_mm);
+    let tip = material.tip.map_or(Tip::Plain, Tip::from);
     let edge_mm = args
         .edge
         .or_else(|| middle(pulled.iter().map(|r| r.edge_mm)))
@@ -252,7 +253,7 @@ fn reference(
     let geometry = Geometry {
         hinge_width_mm: args.hinge_width.unwrap_or(material.hinge_width_mm),
         kerf_mm,
-        tip_radius_mm: radius.unwrap_or(0.5 * kerf_mm),
+        tip_radius_mm: tip.radius_mm(kerf_mm),
         thickness_mm: material.thickness_mm,
         edge_mm,
     };
