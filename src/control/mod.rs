@@ -11,6 +11,7 @@
 
 mod follow;
 mod job;
+pub mod journal;
 mod reply;
 pub mod script;
 mod send;
