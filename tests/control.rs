@@ -9,7 +9,9 @@ use std::time::Duration;
 use kagome::base::progress::{Progress, Silent};
 use kagome::control::script::{Exchange, Script};
 use kagome::control::{Job, JobRules, Proof, SendError, SendOptions, SendReport, StopReason, send};
-use kagome::sim::{Burn, Controller, Faults, Settings, SimTransport, State, rehearse, strokes};
+use kagome::sim::{
+    At, Burn, Controller, Faults, Mishap, Settings, SimTransport, State, rehearse, strokes,
+};
 use proptest::prelude::*;
 
 /// Slits as a job, with M4.
@@ -125,11 +127,12 @@ fn an_unplugged_job_ends_dark_and_within_its_path_wherever_the_cable_is_cut() {
     for sending in [true, false] {
         let total = if sending { sent } else { received };
         for at in (0..total).step_by(7) {
-            let faults = Faults {
-                cut_after_sent: sending.then_some(at),
-                cut_after_received: (!sending).then_some(at),
-                ..Faults::default()
+            let at_byte = if sending {
+                At::Sent(at)
+            } else {
+                At::Received(at)
             };
+            let faults = Faults::one(at_byte, Mishap::Unplug);
             let mut link = SimTransport::with_faults(machine(), faults);
             let error = run(&mut link, &text).expect_err("the cable was cut");
             match error {

@@ -9,6 +9,7 @@
 pub mod burnt;
 pub mod controller;
 mod estimate;
+mod faults;
 mod link;
 mod modal;
 pub mod pty;
@@ -17,9 +18,10 @@ mod settings;
 mod words;
 
 pub use burnt::{BeamTime, Burn, Stroke, strokes};
-pub use controller::{Controller, State};
+pub use controller::{Controller, Life, State};
 pub use estimate::{EstimateError, estimate};
-pub use link::{Faults, SimTransport};
+pub use faults::{At, Faults, Mishap};
+pub use link::SimTransport;
 pub use modal::Spindle;
 pub use rehearse::{Rehearsal, RehearsalError, RehearsalSummary, rehearse};
 pub use settings::Settings;

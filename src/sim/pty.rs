@@ -153,9 +153,7 @@ mod unix {
                     Ok(count) => {
                         if !connected {
                             (connected, ever) = (true, true);
-                            if how.reset_on_open {
-                                controller.power_up();
-                            }
+                            controller.port_opened(how.reset_on_open);
                         }
                         controller.write(&buffer[..count]);
                         count > 0
@@ -164,9 +162,7 @@ mod unix {
                         // Open, and silent.
                         if !connected {
                             (connected, ever) = (true, true);
-                            if how.reset_on_open {
-                                controller.power_up();
-                            }
+                            controller.port_opened(how.reset_on_open);
                         }
                         false
                     }

@@ -360,7 +360,7 @@ fn a_dwell_that_ends_while_a_short_hold_still_blocks_the_program_is_over() {
 fn a_restarted_controller_calls_the_place_of_the_head_zero_and_burns_where_the_head_is() {
     let mut b = Bench::laser();
     b.send("G21G90\nG0X30Y20\n", 5.0);
-    b.machine.power_up();
+    b.machine.reboot();
     b.wait(0.1);
     assert_eq!(b.machine.position_mm(), [0.0; 3]);
     assert_eq!(b.machine.head_mm(), [30.0, 20.0, 0.0]);
@@ -383,7 +383,7 @@ fn homing_finds_the_true_place_again() {
     });
     b.send("$H\n", 5.0);
     b.send("G21G91\nG0X-20\n", 5.0);
-    b.machine.power_up();
+    b.machine.reboot();
     assert_eq!(b.machine.position_mm(), [0.0; 3]);
     assert_eq!(b.machine.head_mm(), [-21.0, -1.0, -1.0]);
     b.send("$H\n", 5.0);

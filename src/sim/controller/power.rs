@@ -1,0 +1,110 @@
+//! Power, and what takes the controller down without asking it.
+//!
+//! What survives: the settings and the coordinate systems in its memory, the sheet with its burns, and the head, which
+//! stays where it is. What does not: everything else, above all the controller's knowledge of where the head stands.
+
+use super::{Controller, State};
+
+/// Whether anybody is at home.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Life {
+    /// As it should be.
+    Running,
+    /// The firmware hangs: no answer, no motion, and every output as it was at that moment. Only a [`Controller::reboot`]
+    /// or the power switch helps.
+    Hung,
+    /// Without power: no answer, no motion, no beam.
+    Off,
+}
+
+impl Controller {
+    /// Whether it runs, hangs or has no power.
+    pub fn life(&self) -> Life {
+        self.life
+    }
+
+    /// The power is cut: everything stops, nothing is heard any more and the beam is off.
+    pub fn power_off(&mut self) {
+        self.break_off();
+        self.outgoing.clear();
+        self.receive.clear();
+        self.life = Life::Off;
+    }
+
+    /// The power is back: the controller starts with its banner and calls the place where the head stands zero.
+    /// `shift_mm` is how far the head was moved on the bed meanwhile: by hand, or by its own weight. Without a
+    /// [`Self::power_off`] before it, this is the switch flipped off and on.
+    pub fn power_on(&mut self, shift_mm: [f64; 3]) {
+        if self.life != Life::Off {
+            self.power_off();
+        }
+        for (zero, shift) in self.zero.iter_mut().zip(shift_mm) {
+            *zero += shift;
+        }
+        self.reboot();
+    }
+
+    /// The controller starts anew, without an alarm: its reset line was pulled (as by DTR when the port is opened), or
+    /// its supply dipped. The head stays where it is, but the controller has forgotten where that is, and calls it
+    /// zero.
+    pub fn reboot(&mut self) {
+        self.break_off();
+        self.outgoing.clear();
+        (self.outgoing_free_s, self.incoming_free_s) = (self.now_s, self.now_s);
+        self.deaf_until_s = self.now_s;
+        self.life = Life::Running;
+        self.zero = self.head_mm();
+        self.position = [0.0; 3];
+        self.restart();
+        self.state = if self.settings.homing {
+            State::Alarm
+        } else {
+            State::Idle
+        };
+        self.banner();
+    }
+
+    /// The firmware hangs from now on, with the beam as it is now.
+    pub fn hang(&mut self) {
+        if self.life != Life::Running {
+            return;
+        }
+        let light = self.light;
+        self.halt();
+        let head = self.head_mm();
+        self.shine(head, light);
+        self.forget_program();
+        self.incoming.clear();
+        self.receive.clear();
+        self.life = Life::Hung;
+    }
+
+    /// A limit switch closes: the firmware stops at once, beam off, and wants a reset (ALARM:1). It does not matter
+    /// here whether `$21` is set: the wire is what it is.
+    pub fn limit_switch(&mut self) {
+        if self.life != Life::Running {
+            return;
+        }
+        self.stop_motion();
+        self.forget_program();
+        self.receive.clear();
+        self.state = State::Critical;
+        self.say("ALARM:1");
+        self.say("[MSG:Reset to continue]");
+    }
+
+    /// A host opens the port: what was said to nobody is gone, and boards whose reset hangs on DTR start anew.
+    pub fn port_opened(&mut self, resets: bool) {
+        self.outgoing.clear();
+        if resets && self.life != Life::Off {
+            self.reboot();
+        }
+    }
+
+    /// Everything ends where it is, in the middle of a motion if need be.
+    fn break_off(&mut self) {
+        self.incoming.clear();
+        self.stop_motion();
+        self.forget_program();
+    }
+}
