@@ -235,6 +235,11 @@ impl Job {
         Some((&self.text[start..end], number))
     }
 
+    /// All lines in order, as [`Job::line`] gives them.
+    pub fn lines(&self) -> impl Iterator<Item = (&str, usize)> {
+        (0..self.len()).filter_map(|k| self.line(k))
+    }
+
     /// True if the job uses M3.
     pub fn constant_power(&self) -> bool {
         self.constant_power

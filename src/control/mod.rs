@@ -9,13 +9,16 @@
 //! What software cannot do: an M3 (constant power) beam stays on after the cable is pulled, until the firmware ends
 //! it. M4 goes dark by itself when motion ends; so M3 is refused unless asked for.
 
+mod follow;
 mod job;
+pub mod journal;
 mod reply;
 pub mod script;
 mod send;
 mod serial;
 mod transport;
 
+pub use follow::{Cut, Cuts, Follower, NotFollowed, Sighting};
 pub use job::{Job, JobError, JobRules};
 pub use reply::{MachineState, Reply, Status};
 pub use send::{Confirmed, Proof, SendError, SendOptions, SendReport, StopReason, send};

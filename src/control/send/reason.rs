@@ -1,0 +1,100 @@
+//! Why a running job was stopped.
+
+use std::fmt;
+
+/// Why a running job was stopped.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StopReason {
+    /// The person asked for it.
+    Interrupted,
+    /// The controller refused a line.
+    Refused {
+        /// GRBL's error number.
+        error: u32,
+        /// Number of the line in the file.
+        line: usize,
+        /// The line.
+        text: String,
+    },
+    /// The controller locked itself.
+    Alarm(u32),
+    /// The controller started anew in the middle of the job.
+    Reset(String),
+    /// The controller does not answer.
+    Silent {
+        /// For how long, s.
+        seconds: f64,
+    },
+    /// The machine is paused and nobody resumes it.
+    Paused {
+        /// For how long, s.
+        seconds: f64,
+    },
+    /// An answer that no line was waiting for, or a line that got none: bytes were lost or damaged.
+    Ledger(String),
+    /// The job was acknowledged to its end and the machine stands, but its beam is on.
+    BeamOn {
+        /// The power told, S.
+        s: f64,
+    },
+}
+
+impl fmt::Display for StopReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Interrupted => f.write_str("interrupted"),
+            Self::Refused { error, line, text } => write!(
+                f,
+                "the controller refused line {line} ({text}) with error {error}: {}",
+                error_words(*error)
+            ),
+            Self::Alarm(n) => write!(f, "the controller raised alarm {n}: {}", alarm_words(*n)),
+            Self::Reset(banner) => write!(
+                f,
+                "the controller started anew in the middle of the job ({banner}): check its power supply and the emergency stop"
+            ),
+            Self::Silent { seconds } => {
+                write!(f, "the controller has not answered for {seconds:.1} s")
+            }
+            Self::Paused { seconds } => write!(
+                f,
+                "the machine has been paused for {seconds:.0} s (M0 in the job, or a hold) and nobody resumes it"
+            ),
+            Self::Ledger(what) => write!(
+                f,
+                "{what}: bytes were lost or damaged on the way; use a shorter, better shielded cable"
+            ),
+            Self::BeamOn { s } => write!(
+                f,
+                "the job has ended but the machine reports power S{s}: its beam was on while standing"
+            ),
+        }
+    }
+}
+
+/// GRBL's errors, in words for a person.
+pub(super) fn error_words(number: u32) -> &'static str {
+    match number {
+        1 | 2 => "a word of it is damaged",
+        8 => "it must be idle for this",
+        9 => "it is locked; unlock or home it",
+        11 => "the line is too long for it",
+        20 => "it does not know a word of it",
+        21 => "two words of it contradict each other",
+        22 => "no feed rate (F) has been set",
+        24 | 25 => "a word is repeated or two commands want the same axes",
+        33..=35 => "the arc is not valid",
+        _ => "see GRBL's list of errors",
+    }
+}
+
+/// GRBL's alarms, in words for a person.
+fn alarm_words(number: u32) -> &'static str {
+    match number {
+        1 => "a limit switch was hit; position may be lost",
+        2 => "the job leaves the machine's travel",
+        3 => "it was reset while moving; position is lost",
+        6..=9 => "homing failed",
+        _ => "see GRBL's list of alarms",
+    }
+}

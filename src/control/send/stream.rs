@@ -1,0 +1,174 @@
+//! The job itself: lines go out as far as the controller has room, and every one is owned until it is answered.
+
+use std::io;
+use std::time::Duration;
+
+use super::reason::StopReason;
+use super::{Sender, Trouble};
+use crate::control::reply::{MachineState, Reply};
+
+impl Sender<'_> {
+    /// Fills the controller's buffer as far as it is known to be free.
+    fn fill(&mut self, buffer: usize) -> io::Result<()> {
+        let mut batch = Vec::new();
+        while let Some((text, _)) = self.job.line(self.sent) {
+            let cost = text.len() + 1;
+            if self.in_flight + cost > buffer {
+                break;
+            }
+            batch.extend_from_slice(text.as_bytes());
+            batch.push(b'\n');
+            self.ledger.push_back(cost);
+            self.in_flight += cost;
+            self.sent += 1;
+        }
+        self.max_in_flight = self.max_in_flight.max(self.in_flight);
+        if batch.is_empty() {
+            return Ok(());
+        }
+        self.bytes += batch.len() as u64;
+        self.link.send(&batch)
+    }
+
+    /// A line has been answered; gives its index in the job.
+    pub(super) fn settle(&mut self) -> Result<usize, Trouble> {
+        let Some(cost) = self.ledger.pop_front() else {
+            return Err(Trouble::Stop(StopReason::Ledger(
+                "the controller answered a line that was not sent".into(),
+            )));
+        };
+        self.in_flight -= cost;
+        Ok(self.sent - self.ledger.len() - 1)
+    }
+
+    pub(super) fn stream(&mut self, buffer: usize) -> Result<(), Trouble> {
+        let mut next_poll = self.now() + self.options.poll;
+        let mut asked_at: Option<Duration> = None;
+        // Idle reports in a row with nothing else said: at the end, or with lines that will never be answered.
+        let mut idle_since: Option<Duration> = None;
+        let mut idle_reports = 0;
+        let mut held_since: Option<Duration> = None;
+        let patience = Duration::try_from_secs_f64(self.job.longest_dwell_s())
+            .unwrap_or(Duration::from_secs(3600))
+            + Duration::from_secs(3);
+        loop {
+            if self.progress.interrupted() {
+                return Err(Trouble::Stop(StopReason::Interrupted));
+            }
+            self.fill(buffer)?;
+            let now = self.now();
+            if let Some(asked) = asked_at
+                && now.saturating_sub(asked) > self.options.silence
+            {
+                let seconds = (now - asked).as_secs_f64();
+                return Err(Trouble::Stop(StopReason::Silent { seconds }));
+            }
+            if now >= next_poll {
+                next_poll = now + self.options.poll;
+                if asked_at.is_none() {
+                    self.link.send(b"?")?;
+                    asked_at = Some(now);
+                }
+            }
+            let Some(reply) = self.link.reply(next_poll)? else {
+                continue;
+            };
+            match reply {
+                Reply::Ok => {
+                    self.settle()?;
+                    self.acknowledged += 1;
+                    self.progress.advance(1);
+                    (idle_since, idle_reports) = (None, 0);
+                    if self.ledger.is_empty() && self.job.line(self.sent).is_none() {
+                        // The end is near: ask at once.
+                        next_poll = self.now();
+                    }
+                }
+                Reply::Error(error) => {
+                    let index = self.settle()?;
+                    let (text, line) = self.job.line(index).unwrap_or(("", 0));
+                    return Err(Trouble::Stop(StopReason::Refused {
+                        error,
+                        line,
+                        text: text.to_owned(),
+                    }));
+                }
+                Reply::Alarm(number) => return Err(Trouble::Stop(StopReason::Alarm(number))),
+                Reply::Banner(text) => return Err(Trouble::Stop(StopReason::Reset(text))),
+                Reply::Status(status) => {
+                    let asked = asked_at.take();
+                    let state = status.state;
+                    let s = status.s;
+                    self.status = Some(status);
+                    let holding = matches!(state, MachineState::Hold(_) | MachineState::Door(_));
+                    match held_since {
+                        None if holding => {
+                            held_since = Some(now);
+                            self.progress.note(
+                                "the machine is paused; it goes on when resumed there, Ctrl-C ends the job",
+                            );
+                        }
+                        Some(_) if !holding => {
+                            held_since = None;
+                            self.progress.note("the machine goes on");
+                        }
+                        Some(since)
+                            if self
+                                .options
+                                .longest_pause
+                                .is_some_and(|longest| now.saturating_sub(since) > longest) =>
+                        {
+                            let seconds = (now - since).as_secs_f64();
+                            return Err(Trouble::Stop(StopReason::Paused { seconds }));
+                        }
+                        _ => {}
+                    }
+                    if state == MachineState::Alarm {
+                        return Err(Trouble::Stop(StopReason::Alarm(0)));
+                    }
+                    if matches!(state, MachineState::Check | MachineState::Sleep) {
+                        return Err(Trouble::Stop(StopReason::Ledger(format!(
+                            "the machine has gone to {state:?} in the middle of the job"
+                        ))));
+                    }
+                    if state != MachineState::Idle {
+                        (idle_since, idle_reports) = (None, 0);
+                        continue;
+                    }
+                    idle_reports += 1;
+                    let since = *idle_since.get_or_insert(asked.unwrap_or(now));
+                    let all_answered = self.ledger.is_empty() && self.job.line(self.sent).is_none();
+                    // One report may have been on its way before the last answer; the second was not.
+                    if all_answered && idle_reports >= 2 {
+                        return match s {
+                            Some(0.0) => Ok(()),
+                            Some(s) => Err(Trouble::Stop(StopReason::BeamOn { s })),
+                            None => Err(Trouble::Stop(StopReason::Ledger(
+                                "the last report does not tell the power".into(),
+                            ))),
+                        };
+                    }
+                    if all_answered {
+                        next_poll = self.now();
+                    } else if self.now().saturating_sub(since) > patience {
+                        return Err(Trouble::Stop(StopReason::Ledger(format!(
+                            "the machine is idle but {} lines were never answered",
+                            self.ledger.len()
+                        ))));
+                    }
+                }
+                Reply::Message(text) => {
+                    if !text.starts_with("[MSG:Pgm End") {
+                        self.progress.note(&text);
+                    }
+                }
+                Reply::Setting(..) => {}
+                Reply::Unknown(text) => {
+                    return Err(Trouble::Stop(StopReason::Ledger(format!(
+                        "the controller said {text:?}, which is no answer"
+                    ))));
+                }
+            }
+        }
+    }
+}
