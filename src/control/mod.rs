@@ -21,6 +21,9 @@ mod transport;
 pub use follow::{Cut, Cuts, Follower, NotFollowed, Sighting};
 pub use job::{Job, JobError, JobRules};
 pub use reply::{MachineState, Reply, Status};
-pub use send::{Confirmed, Proof, SendError, SendOptions, SendReport, StopReason, send};
+pub use send::{
+    Confirmed, Proof, Question, SendError, SendOptions, SendReport, StopReason, Streaming, resume,
+    send, send_recorded,
+};
 pub use serial::{PortError, SerialTransport, ports};
 pub use transport::Transport;
