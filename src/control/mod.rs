@@ -27,7 +27,10 @@ pub use follow::{Cut, Cuts, Follower, NotFollowed, Sighting};
 pub use job::{Job, JobError, JobRules};
 pub use port::{OpenPort, usb_name};
 pub use reply::{MachineState, Reply, Status};
-pub use send::{Confirmed, Proof, SendError, SendOptions, SendReport, StopReason, send};
+pub use send::{
+    Confirmed, Proof, Question, SendError, SendOptions, SendReport, StopReason, Streaming, resume,
+    send, send_recorded,
+};
 pub use serial::{PortError, SerialTransport, ports};
 pub use stranger::words as words_of_a_stranger;
 pub use tcp::TcpTransport;

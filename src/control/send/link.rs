@@ -12,6 +12,8 @@ pub(super) struct Link<'a> {
     pub transport: &'a mut dyn Transport,
     pub partial: Vec<u8>,
     pub lines: VecDeque<Reply>,
+    /// What the controller's lengths are in, mm.
+    pub unit_mm: f64,
 }
 
 impl Link<'_> {
@@ -20,7 +22,10 @@ impl Link<'_> {
     pub fn reply(&mut self, deadline: Duration) -> io::Result<Option<Reply>> {
         loop {
             if let Some(reply) = self.lines.pop_front() {
-                return Ok(Some(reply));
+                return Ok(Some(match reply {
+                    Reply::Status(status) => Reply::Status(status.scaled(self.unit_mm)),
+                    other => other,
+                }));
             }
             let now = self.transport.now();
             let mut buffer = [0; 512];

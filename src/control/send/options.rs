@@ -2,6 +2,15 @@
 
 use std::time::Duration;
 
+/// How lines are handed over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Streaming {
+    /// As many as the controller's receive buffer holds: the planner never waits for the line.
+    Counted,
+    /// One at a time, each after the answer to the one before: for firmware that loses count.
+    Answered,
+}
+
 /// How to send.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SendOptions {
@@ -13,8 +22,11 @@ pub struct SendOptions {
     /// How long to wait for the controller's banner after the port was opened, before it is reset. Boards that reset
     /// by themselves need up to 2 s for their boot loader.
     pub banner_wait: Duration,
-    /// How often the status is asked for.
+    /// How often the status is asked for. Ten times a second is what GRBL's authors call its most; it decides how soon a
+    /// cut is proven.
     pub poll: Duration,
+    /// How the lines are handed over.
+    pub streaming: Streaming,
     /// How long a controller may be silent before it counts as lost.
     pub silence: Duration,
     /// How long the machine may be paused (M0, a feed hold pressed at the machine, its door) before the job is
@@ -28,7 +40,8 @@ impl Default for SendOptions {
             s_max: None,
             buffer: None,
             banner_wait: Duration::from_secs(2),
-            poll: Duration::from_millis(200),
+            poll: Duration::from_millis(100),
+            streaming: Streaming::Counted,
             silence: Duration::from_secs(5),
             longest_pause: None,
         }
