@@ -10,6 +10,7 @@
 //! it. M4 goes dark by itself when motion ends; so M3 is refused unless asked for.
 
 mod awake;
+mod console;
 mod follow;
 mod job;
 pub mod journal;
@@ -19,10 +20,15 @@ pub mod script;
 mod send;
 mod serial;
 mod stranger;
+mod survey;
 mod tcp;
 mod transport;
 
 pub use awake::Awake;
+pub use console::{
+    Console, ConsoleError, JogTo, Move, Restored, SettingDifference,
+    Settings as ControllerSettings, SettingsError, Told, work_mm,
+};
 pub use follow::{Cut, Cuts, Follower, NotFollowed, Sighting};
 pub use job::{Job, JobError, JobRules};
 pub use port::{OpenPort, usb_name};
@@ -33,5 +39,6 @@ pub use send::{
 };
 pub use serial::{PortError, SerialTransport, ports};
 pub use stranger::words as words_of_a_stranger;
+pub use survey::{JobReach, Survey};
 pub use tcp::TcpTransport;
 pub use transport::Transport;
