@@ -196,7 +196,7 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
 }
 
 /// A machine that cannot be reached is bad input; one that stopped, or refuses, is an answer.
-fn failure(error: SendError) -> Failure {
+pub(super) fn failure(error: SendError) -> Failure {
     match error {
         SendError::Connect { .. } | SendError::NoController { .. } => Failure::bad(error),
         _ => Failure::No(error.to_string()),
