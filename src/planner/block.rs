@@ -73,6 +73,8 @@ pub struct Block {
     pub acceleration_mm_s2: f64,
     /// The speed wanted, mm/s: the programmed one within the axes' limits.
     pub nominal_mm_s: f64,
+    /// The fastest that the axes can go along the direction, mm/s.
+    pub fastest_mm_s: f64,
 }
 
 /// The slowest programmed rate, mm/min. GRBL does the same: a rate of zero would never arrive.
@@ -99,6 +101,7 @@ impl Block {
             length_mm,
             acceleration_mm_s2: projected(limits.acceleration_mm_s2, direction),
             nominal_mm_s: rate / 60.0,
+            fastest_mm_s: fastest / 60.0,
         })
     }
 

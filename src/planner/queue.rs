@@ -136,6 +136,20 @@ impl<T> Queue<T> {
         }
     }
 
+    /// Other speeds for the blocks held, mm/s (an override): corners are judged again and everything is planned anew.
+    pub fn set_nominal(&mut self, wanted: impl Fn(&Block, &T) -> f64) {
+        for entry in &mut self.entries {
+            entry.block.nominal_mm_s = wanted(&entry.block, &entry.payload);
+        }
+        for k in 1..self.entries.len() {
+            let corner_sqr = self.entries[k]
+                .block
+                .corner_sqr(&self.entries[k - 1].block, &self.limits);
+            self.entries[k].corner_sqr = corner_sqr;
+        }
+        self.replan_all();
+    }
+
     /// Plans anew from what is known of the first block, all of it: after a hold changed the speed.
     pub fn replan_all(&mut self) {
         self.planned = 0;

@@ -23,12 +23,12 @@ impl Settings {
         Firmware {
             planner_blocks: self.planner_blocks,
             byte_time_s: self.byte_time_s,
-            stop_delay_s: if self.step_idle_delay_ms < 255.0 {
+            stop_delay_s: if self.flavour.waits_at_stops() && self.step_idle_delay_ms < 255.0 {
                 self.step_idle_delay_ms * 1e-3
             } else {
                 0.0
             },
-            dwell_piece_s: 0.05,
+            dwell_piece_s: self.flavour.dwell_piece_s(),
             steps_per_mm: self.steps_per_mm,
         }
     }
@@ -86,7 +86,11 @@ pub fn estimate(job: &str, settings: &Settings) -> Result<Estimate, EstimateErro
                 }
                 Action::Sync | Action::Pause | Action::End => 0.0,
                 Action::Dwell { left_s, .. } => left_s,
-                Action::Spindle { .. } | Action::Memory | Action::Home => continue,
+                Action::Spindle { .. }
+                | Action::Memory
+                | Action::Home
+                | Action::Jog { .. }
+                | Action::Sleep => continue,
             };
             steps.push(Step {
                 motion: Motion::Stop { wait_s },

@@ -1,5 +1,6 @@
 //! The numbers a GRBL controller keeps in its memory, `$0` to `$132`.
 
+use super::flavour::Flavour;
 use crate::machine::Machine;
 use crate::planner::Limits;
 
@@ -7,26 +8,36 @@ use crate::planner::Limits;
 /// otherwise: laser mode on, 80 steps/mm, rates and travel of a small frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
+    /// Which firmware it is. Not a `$` setting.
+    pub flavour: Flavour,
+    /// `$0`: length of a step's pulse, µs (kept and reported, without effect here).
+    pub step_pulse_us: f64,
     /// `$1`: how long the motors are held after each stop, ms; 255 keeps them on. It blocks the firmware.
     pub step_idle_delay_ms: f64,
+    /// `$2`–`$6`: which signals are inverted (kept and reported, without effect here).
+    pub inversions: [f64; 5],
     /// `$10`: what a status report holds; bit 0 machine position, bit 1 free buffers.
     pub status_mask: f64,
     /// `$11`: junction deviation, mm.
     pub junction_deviation_mm: f64,
     /// `$12`: how far an arc's segments may stray from it, mm.
     pub arc_tolerance_mm: f64,
-    /// `$13`: reports in inches (kept and reported, without effect here).
-    pub report_inches: f64,
+    /// `$13`: reports in inches.
+    pub report_inches: bool,
     /// `$20`: soft limits.
     pub soft_limits: bool,
-    /// `$21`: hard limits (kept and reported; the simulated frame has no switches).
+    /// `$21`: hard limits: with homing, the frame has switches at the ends of its travel.
     pub hard_limits: bool,
     /// `$22`: homing is required after power-up.
     pub homing: bool,
     /// `$23`: bit k set: axis k homes towards its negative end.
     pub homing_direction_mask: f64,
+    /// `$24`: slow homing rate, mm/min (kept and reported, without effect here).
+    pub homing_feed_mm_min: f64,
     /// `$25`: homing rate, mm/min.
     pub homing_seek_mm_min: f64,
+    /// `$26`: how long a switch must be closed, ms (kept and reported, without effect here).
+    pub homing_debounce_ms: f64,
     /// `$27`: distance from the switch after homing, mm.
     pub homing_pull_off_mm: f64,
     /// `$30`: the S word of full power.
@@ -47,8 +58,7 @@ pub struct Settings {
     pub receive_buffer: usize,
     /// Usable planner blocks. Compiled in, and told by `$I`.
     pub planner_blocks: usize,
-    /// How long the firmware takes to read and plan a line, s per byte of it. Measured on an AVR: 5.3 kB/s, whether
-    /// as 330 lines of 16 bytes or 295 of 18.
+    /// How long the firmware takes to read and plan a line, s per byte of it: [`Flavour::byte_time_s`].
     pub byte_time_s: f64,
     /// Speed of the serial line, baud at 10 bits a byte; none for a line that takes no time.
     pub baud: Option<f64>,
@@ -57,16 +67,21 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
+            flavour: Flavour::Grbl,
+            step_pulse_us: 10.0,
             step_idle_delay_ms: 25.0,
-            status_mask: 1.0,
+            inversions: [0.0; 5],
+            status_mask: Flavour::Grbl.status_mask(),
             junction_deviation_mm: 0.01,
             arc_tolerance_mm: 0.002,
-            report_inches: 0.0,
+            report_inches: false,
             soft_limits: false,
             hard_limits: false,
             homing: false,
             homing_direction_mask: 0.0,
+            homing_feed_mm_min: 25.0,
             homing_seek_mm_min: 500.0,
+            homing_debounce_ms: 250.0,
             homing_pull_off_mm: 1.0,
             s_max: 1000.0,
             s_min: 0.0,
@@ -77,7 +92,7 @@ impl Default for Settings {
             travel_mm: [500.0, 500.0, 200.0],
             receive_buffer: 128,
             planner_blocks: 15,
-            byte_time_s: 1.0 / 5300.0,
+            byte_time_s: Flavour::Grbl.byte_time_s(),
             baud: Some(115_200.0),
         }
     }
@@ -128,12 +143,30 @@ impl Settings {
                 ..Self::laser(&limits, travel_mm, standard.s_max)
             },
         };
+        settings = settings.with_flavour(Flavour::of(machine.controller));
         if let Some(connection) = &machine.connection {
             settings.receive_buffer = connection.receive_buffer_bytes as usize;
             settings.planner_blocks = connection.planner_blocks as usize;
             settings.baud = Some(f64::from(connection.baud));
         }
         settings
+    }
+
+    /// The same for another firmware: its pace, its reports, and the buffers of a usual board.
+    pub fn with_flavour(self, flavour: Flavour) -> Self {
+        let (receive_buffer, planner_blocks) = match flavour {
+            Flavour::Grbl => (128, 15),
+            Flavour::GrblHal => (1024, 100),
+            Flavour::FluidNc => (256, 16),
+        };
+        Self {
+            flavour,
+            receive_buffer,
+            planner_blocks,
+            byte_time_s: flavour.byte_time_s(),
+            status_mask: flavour.status_mask(),
+            ..self
+        }
     }
 
     /// What the planner needs.
@@ -148,30 +181,25 @@ impl Settings {
     /// The settings as `$$` lists them.
     pub(crate) fn rows(&self) -> Vec<Row> {
         let flag = |b: bool| f64::from(u8::from(b));
-        let mut rows = vec![
-            (0, 10.0, 0),
-            (1, self.step_idle_delay_ms, 0),
-            (2, 0.0, 0),
-            (3, 0.0, 0),
-            (4, 0.0, 0),
-            (5, 0.0, 0),
-            (6, 0.0, 0),
+        let mut rows = vec![(0, self.step_pulse_us, 0), (1, self.step_idle_delay_ms, 0)];
+        rows.extend((2..).zip(self.inversions).map(|(n, value)| (n, value, 0)));
+        rows.extend([
             (10, self.status_mask, 0),
             (11, self.junction_deviation_mm, 3),
             (12, self.arc_tolerance_mm, 3),
-            (13, self.report_inches, 0),
+            (13, flag(self.report_inches), 0),
             (20, flag(self.soft_limits), 0),
             (21, flag(self.hard_limits), 0),
             (22, flag(self.homing), 0),
             (23, self.homing_direction_mask, 0),
-            (24, 25.0, 3),
+            (24, self.homing_feed_mm_min, 3),
             (25, self.homing_seek_mm_min, 3),
-            (26, 250.0, 0),
+            (26, self.homing_debounce_ms, 0),
             (27, self.homing_pull_off_mm, 3),
             (30, self.s_max, 0),
             (31, self.s_min, 0),
             (32, flag(self.laser_mode), 0),
-        ];
+        ]);
         for (base, values) in [
             (100, self.steps_per_mm),
             (110, self.max_rate_mm_min),
@@ -182,25 +210,58 @@ impl Settings {
                 rows.push((base + k, value, 3));
             }
         }
+        rows.retain(|row| self.flavour.lists(row.0));
         rows
     }
 
-    /// Sets `$number`. Settings that have no meaning here (pulse lengths, pin inversions) are accepted and forgotten.
+    /// FluidNC's name for a numbered setting.
+    pub(crate) fn name(number: u16) -> Option<String> {
+        let axis = |what: &str| {
+            Some(format!(
+                "Grbl/{what}/{}",
+                ["X", "Y", "Z"].get(usize::from(number % 10))?
+            ))
+        };
+        match number {
+            3 => Some("Grbl/InvertMask".into()),
+            10 => Some("Report/Status".into()),
+            20 => Some("Grbl/SoftLimitsEnable".into()),
+            21 => Some("Grbl/HardLimitsEnable".into()),
+            22 => Some("Grbl/HomingCycleEnable".into()),
+            23 => Some("Grbl/HomingDirections".into()),
+            30 => Some("Grbl/MaxSpindleSpeed".into()),
+            32 => Some("Grbl/LaserMode".into()),
+            100..=102 => axis("Resolution"),
+            110..=112 => axis("MaxRate"),
+            120..=122 => axis("Acceleration"),
+            130..=132 => axis("MaxTravel"),
+            _ => None,
+        }
+    }
+
+    /// Sets `$number`.
     ///
     /// # Errors
-    /// GRBL's number: 3 unknown setting, 4 negative, 10 soft limits without homing.
+    /// GRBL's number: 3 unknown setting, 4 negative, 6 pulse too short, 10 soft limits without homing.
     pub(crate) fn set(&mut self, number: u16, value: f64) -> Result<(), u8> {
+        if !self.flavour.takes(number) {
+            return Err(3);
+        }
         if value < 0.0 {
             return Err(4);
         }
         let on = value != 0.0;
         match number {
-            0 | 2..=6 | 24 | 26 => {}
+            0 if value < 3.0 => return Err(6),
+            0 => self.step_pulse_us = value.trunc(),
             1 => self.step_idle_delay_ms = value.trunc(),
+            2..=6 => self.inversions[usize::from(number) - 2] = value.trunc(),
             10 => self.status_mask = value.trunc(),
             11 => self.junction_deviation_mm = value,
             12 => self.arc_tolerance_mm = value.max(1e-6),
-            13 => self.report_inches = value,
+            13 => self.report_inches = on,
+            24 => self.homing_feed_mm_min = value,
+            26 => self.homing_debounce_ms = value.trunc(),
             20 if on && !self.homing => return Err(10),
             20 => self.soft_limits = on,
             21 => self.hard_limits = on,

@@ -1,14 +1,16 @@
 //! The controller: bytes in, bytes out, motion and a beam, on a clock that moves only when told.
 //!
-//! Written after GRBL 1.1h. Nothing runs by ticks: [`Controller::advance`] goes from event to event (a byte arrives, a
+//! Written after GRBL 1.1h; where grblHAL and FluidNC differ stands in [`Flavour`](super::Flavour). Nothing runs by ticks: [`Controller::advance`] goes from event to event (a byte arrives, a
 //! line has been read, a block ends), so a job of minutes takes milliseconds and always gives the same result. Three
 //! things run side by side, as in the firmware: the wires, which take time per byte and lose what finds the receive
 //! buffer full; the main program, which reads one line after the other and waits where the firmware waits; and the
 //! motion, which goes on by itself.
 //!
-//! Not simulated: jogging, overrides (their bytes are ignored), probing, limit switches, startup blocks, sleep.
+//! Not simulated: probing, spindle synchronisation, parking, the motion of homing (the head is there after its time).
 
+mod limits;
 mod motion;
+mod overrides;
 mod power;
 mod program;
 mod realtime;
@@ -24,6 +26,8 @@ use super::burnt::{BeamTime, Bed, Burn, Light};
 use super::modal::{Action, Drive, Modal};
 use super::settings::Settings;
 use crate::planner::{Profile, Queue};
+
+use overrides::Overrides;
 
 pub use power::Life;
 
@@ -48,14 +52,18 @@ pub enum State {
     Alarm,
     /// Locked, and deaf to everything but a reset (ALARM:1 and 2).
     Critical,
+    /// The door is closed again and the output comes back; the head still stands.
+    Restoring,
+    /// Jogging.
+    Jog,
+    /// Asleep: deaf to everything but a reset.
+    Sleep,
     /// Homing.
     Home,
     /// Checks G-code without moving.
     Check,
 }
 
-/// The longest line that is accepted, characters without spaces and comments.
-pub const LINE_LIMIT: usize = 79;
 /// How long the controller hears nothing while it writes its memory, s: some ten bytes at 3.4 ms.
 const MEMORY_S: f64 = 0.034;
 
@@ -66,6 +74,8 @@ struct Cut {
     end: [f64; 3],
     length_mm: f64,
     drive: Drive,
+    /// A jog: the feed override does not touch it.
+    jog: bool,
 }
 
 /// The block that moves now.
@@ -111,11 +121,26 @@ pub struct Controller {
     line: Line,
     ready: Option<Line>,
     actions: VecDeque<Action>,
-    answer: Option<&'static str>,
+    answer: Option<String>,
+    /// Startup lines still to be run.
+    starting: VecDeque<String>,
+    /// The error that is repeated for every block.
+    latched: Option<u8>,
+    /// The last end of a line, to see a pair of them.
+    line_end: Option<u8>,
     /// Leaving check mode resets the controller, once the line has been answered.
     reset_pending: bool,
     report_wanted: bool,
-    reports: u32,
+    /// Reports until the next that tells the work offset, and the overrides.
+    offset_in: u32,
+    overrides_in: u32,
+    overrides: Overrides,
+    /// The number of the last alarm.
+    alarm: u8,
+    // Memory that outlives the power.
+    factory: Settings,
+    startup: [String; 2],
+    owner: String,
     // Motion.
     queue: Queue<Cut>,
     running: Option<Running>,
@@ -124,7 +149,13 @@ pub struct Controller {
     /// Where its zero lies on the bed: a controller that starts anew calls the place where the head stands zero.
     zero: [f64; 3],
     soft_limit_hit: bool,
+    /// A jog is being cancelled.
+    jog_cancelled: bool,
+    /// 0x9E came before the head stood.
+    stop_output: bool,
     held_since_s: f64,
+    /// When the output has come back behind a closed door.
+    restored_s: f64,
     /// When something moved first and last.
     motion_s: Option<[f64; 2]>,
     // The beam.
@@ -146,6 +177,9 @@ impl Controller {
             } else {
                 State::Idle
             },
+            factory: settings.clone(),
+            startup: Default::default(),
+            owner: String::new(),
             settings,
             life: Life::Running,
             now_s: 0.0,
@@ -161,21 +195,30 @@ impl Controller {
             ready: None,
             actions: VecDeque::new(),
             answer: None,
+            starting: VecDeque::new(),
+            latched: None,
+            line_end: None,
             reset_pending: false,
             report_wanted: false,
-            reports: 0,
+            offset_in: 0,
+            overrides_in: 0,
+            overrides: Overrides::default(),
+            alarm: 0,
             running: None,
             position: [0.0; 3],
             zero: [0.0; 3],
             soft_limit_hit: false,
+            jog_cancelled: false,
+            stop_output: false,
             held_since_s: 0.0,
+            restored_s: 0.0,
             motion_s: None,
             bed: Bed::default(),
             light: Light::DARK,
             at_rest: Light::DARK,
             before_hold: Light::DARK,
         };
-        new.banner();
+        new.boot();
         new
     }
 
@@ -249,6 +292,7 @@ impl Controller {
         self.ready.is_some()
             || !self.actions.is_empty()
             || self.answer.is_some()
+            || !self.starting.is_empty()
             || self.report_wanted
             || !self.receive.is_empty()
             || self.busy_until_s > self.now_s
@@ -273,8 +317,14 @@ impl Controller {
         if let Some(running) = &self.running {
             next = next.min(running.start_s + running.profile.duration_s());
         }
+        if let Some(at) = self.switch_s() {
+            next = next.min(at);
+        }
         if self.busy_until_s > self.now_s {
             next = next.min(self.busy_until_s);
+        }
+        if self.state == State::Restoring {
+            next = next.min(self.restored_s.max(self.busy_until_s));
         }
         if !self.suspended()
             && let Some(Action::Dwell {
@@ -326,6 +376,10 @@ impl Controller {
             {
                 self.incoming.pop_front();
                 self.arrive(byte);
+                progress = true;
+            }
+            if self.switch_s().is_some_and(|at| at <= self.now_s) {
+                self.limit_switch();
                 progress = true;
             }
             if let Some(running) = self.running

@@ -1,5 +1,6 @@
 //! What moves, where the head is, and the beam along the way.
 
+use super::overrides::Overrides;
 use super::{Controller, Cut, Running, State};
 use crate::planner::{Move, Profile, dark_before_stop_s};
 use crate::sim::burnt::Light;
@@ -18,16 +19,9 @@ impl Controller {
     }
 
     /// Plans a straight move: soft limits, whole steps, and the look-ahead of what already moves.
-    pub(super) fn plan_line(&mut self, target: [f64; 3], drive: Drive) {
+    pub(super) fn plan_line(&mut self, target: [f64; 3], drive: Drive, jog: bool) {
         if self.settings.soft_limits && !self.within_travel(target) {
-            self.actions.clear();
-            self.answer = None;
-            self.soft_limit_hit = true;
-            if self.running.is_some() {
-                self.hold(false);
-            } else {
-                self.soft_limit_alarm();
-            }
+            self.beyond_travel();
             return;
         }
         let end: [f64; 3] = std::array::from_fn(|k| {
@@ -42,6 +36,7 @@ impl Controller {
             end,
             length_mm,
             drive,
+            jog,
         };
         let exit_before = self.queue.exit_sqr();
         let mut now = (0.0, 0.0);
@@ -57,6 +52,7 @@ impl Controller {
             rate_mm_min: drive.rate_mm_min,
         };
         match self.queue.push(&wanted, cut) {
+            Ok(true) if self.overrides != Overrides::default() => self.new_speeds(),
             Ok(true) => {
                 if self.running.is_some() && self.queue.exit_sqr() != exit_before {
                     self.begin_block(now.0);
@@ -81,12 +77,31 @@ impl Controller {
         self.queue.back().map_or(self.position, |cut| cut.end)
     }
 
-    pub(super) fn within_travel(&self, target: [f64; 3]) -> bool {
-        // GRBL's machine space is negative: from −travel to 0.
-        target
-            .iter()
-            .zip(self.settings.travel_mm)
-            .all(|(&t, travel)| t <= 0.0 && t >= -travel)
+    /// Plans a jog, which sets out at once.
+    pub(super) fn plan_jog(&mut self, target: [f64; 3], rate_mm_min: f64) {
+        if self.jog_cancelled {
+            return;
+        }
+        let drive = Drive {
+            rate_mm_min: Some(rate_mm_min),
+            spindle: self.modal.spindle,
+            s: self.modal.s,
+        };
+        self.modal.position = target;
+        self.plan_line(target, drive, true);
+        if self.running.is_none() && !self.queue.is_empty() {
+            self.state = State::Jog;
+            self.begin_first();
+        }
+    }
+
+    /// Braking to a rest in the middle of what is planned.
+    pub(super) fn braking(&self) -> bool {
+        self.jog_cancelled
+            || matches!(
+                self.state,
+                State::Hold { standing: false } | State::Door { standing: false }
+            )
     }
 
     /// Starts to move if there is something planned and nothing moves; true if it did.
@@ -128,7 +143,7 @@ impl Controller {
             return;
         };
         let light = Light {
-            s: cut.drive.s,
+            s: self.output_word(cut.drive.s),
             spindle: cut.drive.spindle,
             rapid: cut.drive.rate_mm_min.is_none(),
         };
@@ -170,10 +185,7 @@ impl Controller {
             return;
         };
         let left = cut.length_mm - running.behind_mm - running.profile.length_mm();
-        let holding = matches!(
-            self.state,
-            State::Hold { standing: false } | State::Door { standing: false }
-        );
+        let holding = self.braking();
         if holding && left > 1e-9 {
             // Stopped within the block: the rest of it waits.
             self.position = self.whereabouts().0;
@@ -224,7 +236,7 @@ impl Controller {
 
     /// The firmware blocks while it holds the motors for a moment.
     pub(super) fn idle_delay(&mut self) {
-        if self.settings.step_idle_delay_ms < 255.0 {
+        if self.settings.flavour.waits_at_stops() && self.settings.step_idle_delay_ms < 255.0 {
             self.busy_until_s = self
                 .busy_until_s
                 .max(self.now_s + self.settings.step_idle_delay_ms * 1e-3);

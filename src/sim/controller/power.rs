@@ -61,7 +61,8 @@ impl Controller {
         } else {
             State::Idle
         };
-        self.banner();
+        self.alarm = if self.settings.homing { 11 } else { 0 };
+        self.boot();
     }
 
     /// The firmware hangs from now on, with the beam as it is now.
@@ -88,9 +89,7 @@ impl Controller {
         self.stop_motion();
         self.forget_program();
         self.receive.clear();
-        self.state = State::Critical;
-        self.say("ALARM:1");
-        self.say("[MSG:Reset to continue]");
+        self.critical(1);
     }
 
     /// A host opens the port: what was said to nobody is gone, and boards whose reset hangs on DTR start anew.

@@ -1,21 +1,26 @@
 //! The main program: reads one line after the other, and waits where the firmware waits.
 
-use super::{Controller, LINE_LIMIT, Line, MEMORY_S, State};
+use super::overrides::Overrides;
+use super::{Controller, Line, MEMORY_S, State};
 use crate::planner::READING_AT_REST;
 use crate::sim::burnt::Light;
+use crate::sim::flavour::Flavour;
 use crate::sim::modal::{Action, Arc, Spindle, interpret};
 
 impl Controller {
     pub(super) fn suspended(&self) -> bool {
         matches!(
             self.state,
-            State::Hold { .. } | State::Door { .. } | State::Critical
+            State::Hold { .. } | State::Door { .. } | State::Critical | State::Sleep
         )
     }
 
     /// One thing that the main program does now; false if it must wait.
     pub(super) fn main_step(&mut self) -> bool {
-        if self.report_wanted && self.state != State::Critical && self.state != State::Home {
+        // GRBL's locked loop does not look at the wish for a report; its successors' does.
+        let mute = self.state == State::Home
+            || self.state == State::Critical && self.settings.flavour == Flavour::Grbl;
+        if self.report_wanted && !mute {
             self.report_wanted = false;
             self.status_report();
             return true;
@@ -28,16 +33,29 @@ impl Controller {
             self.homed();
             return true;
         }
+        if self.state == State::Restoring {
+            let over = self.restored_s <= self.now_s;
+            if over {
+                self.move_on();
+            }
+            return over;
+        }
         if let Some(action) = self.actions.pop_front() {
             return self.act(action);
         }
         if let Some(answer) = self.answer.take() {
-            self.say(answer);
+            self.say(&answer);
             if std::mem::take(&mut self.reset_pending) {
-                self.restart();
-                self.state = State::Idle;
-                self.banner();
+                self.soft_reset();
             }
+            return true;
+        }
+        if let Some(line) = self.starting.pop_front() {
+            let result = self.block(line.as_bytes());
+            self.answer = Some(match result {
+                Ok(()) => format!(">{line}:ok"),
+                Err(number) => format!(">{line}:error:{number}"),
+            });
             return true;
         }
         if let Some(line) = self.ready.take() {
@@ -65,6 +83,18 @@ impl Controller {
 
     /// One character of a line; true when the line is complete.
     pub(super) fn take_byte(&mut self, byte: u8) -> bool {
+        let limit = self.settings.flavour.line_limit();
+        let named = self.settings.flavour == Flavour::FluidNc;
+        let end = matches!(byte, b'\n' | b'\r').then_some(byte);
+        if self.settings.flavour.pairs_line_ends()
+            && self.line.bytes == 0
+            && end.is_some()
+            && self.line_end.is_some_and(|last| end != Some(last))
+        {
+            self.line_end = None;
+            return false;
+        }
+        self.line_end = end;
         let line = &mut self.line;
         line.bytes += 1;
         match byte {
@@ -76,35 +106,62 @@ impl Controller {
             _ if line.paren || line.semicolon => {}
             b'(' => line.paren = true,
             b';' => line.semicolon = true,
-            b'/' | 0..=b' ' => {}
-            _ if line.text.len() >= LINE_LIMIT => line.overflow = true,
+            b'/' if !(named && line.text.first() == Some(&b'$')) => {}
+            0..=b' ' => {}
+            _ if line.text.len() >= limit => line.overflow = true,
             _ => line.text.push(byte.to_ascii_uppercase()),
         }
         false
     }
 
     pub(super) fn execute(&mut self, line: &Line) {
+        let latches = self.settings.flavour.latches_errors();
         let result = if line.overflow {
             Err(11)
         } else if line.text.is_empty() {
             Ok(())
         } else if line.text[0] == b'$' {
             self.system_line(&line.text)
-        } else if matches!(self.state, State::Alarm) {
+        } else if matches!(self.state, State::Alarm | State::Jog) {
             Err(9)
+        } else if let Some(number) = self.latched {
+            Err(number)
         } else {
-            let mut actions = std::mem::take(&mut self.actions);
-            let result = interpret(&line.text, &mut self.modal, &self.settings, &mut actions);
-            if self.state == State::Check {
-                actions.clear();
-            }
-            self.actions = actions;
-            result
+            self.block(&line.text)
         };
+        if latches {
+            self.latched = result.err();
+        }
         match result {
-            Ok(()) => self.answer = Some("ok"),
+            Ok(()) => self.answer = Some("ok".into()),
             Err(number) => self.say(&format!("error:{number}")),
         }
+    }
+
+    /// A block of G-code.
+    fn block(&mut self, text: &[u8]) -> Result<(), u8> {
+        let mut actions = std::mem::take(&mut self.actions);
+        let offset = self.modal.offset();
+        let result = interpret(text, &mut self.modal, &self.settings, &mut actions);
+        if self.modal.offset() != offset {
+            self.offset_in = 0;
+        }
+        if self.state == State::Check {
+            // Nothing moves, but the limits hold.
+            let mut ends = actions.iter().filter_map(|action| match action {
+                Action::Line { target, .. } => Some(*target),
+                Action::Arc(arc) => Some(arc.target),
+                _ => None,
+            });
+            let fits = !self.settings.soft_limits || ends.all(|t| self.within_travel(t));
+            actions.clear();
+            if !fits {
+                self.soft_limit_alarm();
+                return Ok(());
+            }
+        }
+        self.actions = actions;
+        result
     }
 
     /// Does an action, or puts it back and waits.
@@ -120,17 +177,28 @@ impl Controller {
                 let dark = spindle == Spindle::Off
                     || (self.settings.laser_mode && spindle == Spindle::Dynamic);
                 self.rest(Light {
-                    s: if dark { 0.0 } else { s },
+                    s: if dark { 0.0 } else { self.output_word(s) },
                     spindle,
                     rapid: false,
                 });
+                self.overrides_in = 0;
             }
             Action::Line { target, drive } => {
                 if self.queue.is_full() {
                     self.actions.push_front(action);
                     return self.start_cycle();
                 }
-                self.plan_line(target, drive);
+                self.plan_line(target, drive, false);
+            }
+            Action::Jog {
+                target,
+                rate_mm_min,
+            } => {
+                if self.queue.is_full() {
+                    self.actions.push_front(action);
+                    return false;
+                }
+                self.plan_jog(target, rate_mm_min);
             }
             Action::Arc(mut arc) => {
                 if let Some(target) = arc.point() {
@@ -141,7 +209,7 @@ impl Controller {
                     let drive = arc.drive;
                     arc.next += 1;
                     self.more_arc(arc);
-                    self.plan_line(target, drive);
+                    self.plan_line(target, drive, false);
                 }
             }
             Action::Dwell { left_s, until_s } => {
@@ -157,9 +225,16 @@ impl Controller {
             Action::Pause => self.hold(false),
             Action::End => {
                 self.rest(Light::DARK);
-                self.say("[MSG:Pgm End]");
+                self.overrides = Overrides::default();
+                (self.overrides_in, self.offset_in) = (0, 0);
+                self.message(self.settings.flavour.program_end());
             }
             Action::Memory => self.write_memory(),
+            Action::Sleep => {
+                self.rest(Light::DARK);
+                self.state = State::Sleep;
+                self.message("Sleeping");
+            }
             Action::Home => {
                 self.state = State::Home;
                 let far = self
@@ -178,6 +253,9 @@ impl Controller {
     }
 
     pub(super) fn write_memory(&mut self) {
+        if !self.settings.flavour.deaf_while_writing() {
+            return;
+        }
         self.deaf_until_s = self.now_s + MEMORY_S;
         self.busy_until_s = self.deaf_until_s;
     }

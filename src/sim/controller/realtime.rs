@@ -1,9 +1,14 @@
 //! What acts at once, in the middle of anything: hold, door, resume, stop of the output, reset.
 
+use super::overrides::Overrides;
 use super::{Controller, Line, Running, State};
 use crate::planner::Profile;
 use crate::sim::burnt::Light;
-use crate::sim::modal::Action;
+use crate::sim::flavour::Flavour;
+use crate::sim::modal::{Action, Spindle};
+
+/// How long a spindle gets to run up when the door is closed again, s.
+const RESTORE_S: f64 = 4.0;
 
 impl Controller {
     pub(super) fn hold(&mut self, door: bool) {
@@ -11,12 +16,21 @@ impl Controller {
         match self.state {
             State::Idle | State::Run => self.held_since_s = self.now_s,
             State::Hold { .. } if door => {}
+            State::Jog if door => self.jog_cancelled = true,
+            State::Jog => return self.cancel_jog(),
+            State::Restoring if door => {
+                self.state = State::Door { standing: true };
+                let head = self.on_bed(self.position);
+                self.shine(head, Light::DARK);
+                return;
+            }
             _ => return,
         }
         if let State::Hold { standing } = self.state {
             self.state = State::Door { standing };
             if standing {
-                self.rest(Light::DARK);
+                let head = self.on_bed(self.position);
+                self.shine(head, Light::DARK);
             }
             return;
         }
@@ -29,6 +43,19 @@ impl Controller {
             self.held();
             return;
         }
+        self.brake();
+    }
+
+    /// 0x85, or a hold in a jog: it comes to rest, and what was planned is forgotten.
+    pub(super) fn cancel_jog(&mut self) {
+        if self.state == State::Jog && !self.jog_cancelled {
+            self.jog_cancelled = true;
+            self.brake();
+        }
+    }
+
+    /// From now on the running block slows down.
+    fn brake(&mut self) {
         if let (Some(running), Some((block, cut))) = (self.running, self.queue.front()) {
             let (along, speed) = running.profile.at(self.now_s - running.start_s);
             let behind_mm = running.behind_mm + along;
@@ -51,6 +78,17 @@ impl Controller {
             self.soft_limit_alarm();
             return;
         }
+        if std::mem::take(&mut self.jog_cancelled) {
+            self.queue.clear();
+            self.actions
+                .retain(|action| !matches!(action, Action::Jog { .. }));
+            self.modal.position = self.position;
+            if self.state == State::Jog {
+                self.state = State::Idle;
+                self.rest(self.at_rest);
+                return self.idle_delay();
+            }
+        }
         let door = matches!(self.state, State::Door { .. });
         self.state = if door {
             State::Door { standing: true }
@@ -59,7 +97,8 @@ impl Controller {
         };
         self.before_hold = self.at_rest;
         // Without laser mode a hold leaves the output as it is, as for a mill; the door always switches it off.
-        let light = if self.settings.laser_mode || door {
+        let stop = std::mem::take(&mut self.stop_output);
+        let light = if self.settings.laser_mode || door || stop {
             Light::DARK
         } else {
             self.at_rest
@@ -70,13 +109,40 @@ impl Controller {
     }
 
     pub(super) fn resume(&mut self) {
-        if !matches!(
-            self.state,
-            State::Hold { standing: true } | State::Door { standing: true }
-        ) {
-            return;
+        match self.state {
+            State::Hold { standing: true } => self.move_on(),
+            State::Door { standing: true } => {
+                let output = self.output_wanted();
+                if self.settings.laser_mode || output == Light::DARK {
+                    return self.move_on();
+                }
+                // A spindle, or a torch, comes back before the motion, and gets time to run up.
+                self.state = State::Restoring;
+                let head = self.on_bed(self.position);
+                self.shine(head, output);
+                self.restored_s = self.now_s + RESTORE_S;
+            }
+            _ => {}
         }
+    }
+
+    /// What the program wants of the output where the head stands now.
+    fn output_wanted(&self) -> Light {
+        match self.queue.front() {
+            Some((_, cut)) if cut.drive.s > 0.0 && cut.drive.spindle != Spindle::Off => Light {
+                s: self.output_word(cut.drive.s),
+                spindle: cut.drive.spindle,
+                rapid: false,
+            },
+            Some(_) => Light::DARK,
+            None => self.before_hold,
+        }
+    }
+
+    /// Out of a hold.
+    pub(super) fn move_on(&mut self) {
         self.at_rest = self.before_hold;
+        self.overrides_in = 0;
         if let Some(Action::Dwell {
             until_s: Some(until),
             ..
@@ -93,30 +159,11 @@ impl Controller {
         }
     }
 
-    /// 0x9E: in a hold at rest, the output off, or on again.
-    pub(super) fn spindle_stop(&mut self) {
-        if self.state == (State::Hold { standing: true }) {
-            let light = if self.bed.lit() {
-                Light::DARK
-            } else {
-                self.before_hold
-            };
-            let head = self.on_bed(self.position);
-            self.shine(head, light);
-        }
-    }
-
-    pub(super) fn soft_limit_alarm(&mut self) {
-        self.soft_limit_hit = false;
-        self.stop_motion();
-        self.forget_program();
-        self.state = State::Critical;
-        self.say("ALARM:2");
-        self.say("[MSG:Reset to continue]");
-    }
-
-    /// The motors stop at once, and the beam goes out.
+    /// The beam goes out, and the motors stop at once.
     pub(super) fn stop_motion(&mut self) {
+        // First the beam: the head runs on dark.
+        let head = self.head_mm();
+        self.shine(head, Light::DARK);
         self.halt();
         self.rest(Light::DARK);
     }
@@ -140,6 +187,7 @@ impl Controller {
         self.actions.clear();
         self.answer = None;
         self.reset_pending = false;
+        self.starting.clear();
         self.ready = None;
         self.line = Line::default();
         self.report_wanted = false;
@@ -153,29 +201,63 @@ impl Controller {
         self.receive.clear();
         self.soft_limit_hit = false;
         self.before_hold = Light::DARK;
-        self.reports = 0;
+        (self.jog_cancelled, self.stop_output) = (false, false);
+        (self.offset_in, self.overrides_in) = (0, 0);
+        self.overrides = Overrides::default();
+        (self.latched, self.line_end) = (None, None);
         self.modal.reset(self.position);
         self.queue.set_limits(self.settings.limits());
     }
 
     pub(super) fn soft_reset(&mut self) {
-        let lost = matches!(
-            self.state,
-            State::Run
-                | State::Home
-                | State::Hold { standing: false }
-                | State::Door { standing: false }
-        );
-        let locked = matches!(self.state, State::Alarm | State::Critical);
+        let lost = self.braking() || matches!(self.state, State::Run | State::Home | State::Jog);
+        let locked = matches!(self.state, State::Alarm | State::Critical | State::Sleep);
         self.restart();
         if lost {
-            self.say("ALARM:3");
+            self.raise(3);
         }
         self.state = if lost || locked {
             State::Alarm
         } else {
             State::Idle
         };
-        self.banner();
+        self.boot();
+    }
+
+    /// Tells an alarm.
+    pub(super) fn raise(&mut self, number: u8) {
+        self.alarm = number;
+        if self.settings.flavour == Flavour::FluidNc {
+            let name = match number {
+                1 => "Hard Limit",
+                2 => "Soft Limit",
+                _ => "Abort Cycle",
+            };
+            self.message(&format!("ALARM: {name}"));
+        }
+        self.say(&format!("ALARM:{number}"));
+    }
+
+    /// An alarm after which nothing is done until a reset.
+    pub(super) fn critical(&mut self, number: u8) {
+        self.state = State::Critical;
+        self.raise(number);
+        self.message("Reset to continue");
+    }
+
+    /// The banner, and what follows it: the lock, or the startup lines.
+    pub(super) fn boot(&mut self) {
+        self.say("");
+        self.say(self.settings.flavour.banner());
+        if self.state == State::Alarm {
+            self.message("'$H'|'$X' to unlock");
+        } else {
+            self.starting = self
+                .startup
+                .iter()
+                .filter(|l| !l.is_empty())
+                .cloned()
+                .collect();
+        }
     }
 }

@@ -5,84 +5,120 @@ use std::fmt::Write as _;
 use super::{Controller, State};
 use crate::sim::modal::Spindle;
 
-/// Every how many reports the work offset is told anew: less often while moving, as in the firmware.
-const OFFSET_EVERY: (u32, u32) = (30, 10);
-
-fn triple(values: [f64; 3]) -> String {
-    // No negative zero: a machine at 0 says 0.000.
-    let [x, y, z] = values.map(|v| if v.abs() < 0.0005 { 0.0 } else { v });
-    format!("{x:.3},{y:.3},{z:.3}")
-}
+/// Every how many reports the work offset and the overrides are told: less often while moving, as in the firmware.
+const OFFSET_EVERY: [u32; 2] = [10, 30];
+const OVERRIDES_EVERY: [u32; 2] = [10, 20];
 
 impl Controller {
-    /// The reply to `?`.
-    pub(super) fn status_report(&mut self) {
-        let state = match self.state {
+    /// Three lengths, mm or inches as `$13` wants.
+    fn triple(&self, values: [f64; 3]) -> String {
+        let (unit, digits) = if self.settings.report_inches {
+            (25.4, 4)
+        } else {
+            (1.0, 3)
+        };
+        // No negative zero: a machine at 0 says 0.000.
+        let [x, y, z] = values.map(|v| {
+            if v.abs() < 0.00005 * unit {
+                0.0
+            } else {
+                v / unit
+            }
+        });
+        format!("{x:.digits$},{y:.digits$},{z:.digits$}")
+    }
+
+    /// A rate, in mm/min or inches/min.
+    fn rate(&self, mm_min: f64) -> String {
+        if self.settings.report_inches {
+            format!("{:.1}", mm_min / 25.4)
+        } else {
+            format!("{mm_min:.0}")
+        }
+    }
+
+    fn state_name(&self) -> String {
+        match self.state {
             State::Idle => "Idle",
             State::Run => "Run",
             State::Hold { standing: true } => "Hold:0",
             State::Hold { standing: false } => "Hold:1",
             State::Door { standing: true } => "Door:0",
             State::Door { standing: false } => "Door:2",
+            State::Restoring => "Door:3",
+            State::Alarm | State::Critical
+                if self.settings.flavour.numbers_alarms() && self.alarm != 0 =>
+            {
+                return format!("Alarm:{}", self.alarm);
+            }
             State::Alarm | State::Critical => "Alarm",
             State::Home => "Home",
             State::Check => "Check",
-        };
+            State::Jog => "Jog",
+            State::Sleep => "Sleep",
+        }
+        .to_owned()
+    }
+
+    /// The reply to `?`.
+    pub(super) fn status_report(&mut self) {
         let (place, speed) = self.whereabouts();
-        let mut text = format!("<{state}|");
+        let mut text = format!("<{}|", self.state_name());
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "a mask of 8 bits"
+            reason = "a mask of 9 bits"
         )]
-        let mask = self.settings.status_mask as u8;
+        let mask = self.settings.status_mask as u16;
         let offset = self.modal.offset();
         // Writing to a String cannot fail.
         let _ = if mask & 1 != 0 {
-            write!(text, "MPos:{}", triple(place))
+            write!(text, "MPos:{}", self.triple(place))
         } else {
             let work = std::array::from_fn(|k| place[k] - offset[k]);
-            write!(text, "WPos:{}", triple(work))
+            write!(text, "WPos:{}", self.triple(work))
         };
         if mask & 2 != 0 {
-            let free = self.settings.receive_buffer - self.receive.len();
-            let _ = write!(text, "|Bf:{},{free}", self.queue.free());
+            let _ = write!(text, "|Bf:{},{}", self.queue.free(), self.receive_free());
         }
         let s = self.output_s(speed);
-        let _ = write!(text, "|FS:{:.0},{s:.0}", speed * 60.0);
-        let every = if self.running.is_some() {
-            OFFSET_EVERY.0
+        let _ = write!(text, "|FS:{},{s:.0}", self.rate(speed * 60.0));
+        let busy = usize::from(
+            self.running.is_some() || !matches!(self.state, State::Idle | State::Alarm),
+        );
+        if self.offset_in > 0 {
+            self.offset_in -= 1;
         } else {
-            OFFSET_EVERY.1
-        };
-        match self.reports % every {
-            0 => {
-                let _ = write!(text, "|WCO:{}", triple(offset));
+            self.offset_in = OFFSET_EVERY[busy] - 1;
+            // The overrides come with the next report, not with this one.
+            self.overrides_in = self.overrides_in.max(1);
+            let _ = write!(text, "|WCO:{}", self.triple(offset));
+        }
+        if self.overrides_in > 0 {
+            self.overrides_in -= 1;
+        } else {
+            self.overrides_in = OVERRIDES_EVERY[busy] - 1;
+            let o = self.overrides;
+            let _ = write!(text, "|Ov:{},{},{}", o.feed, o.rapid, o.spindle);
+            let mut accessories = String::new();
+            if self.bed.lit() {
+                accessories.push(if self.light.spindle == Spindle::Dynamic {
+                    'C'
+                } else {
+                    'S'
+                });
             }
-            1 => {
-                text.push_str("|Ov:100,100,100");
-                let mut accessories = String::new();
-                if self.bed.lit() {
-                    accessories.push(if self.modal.spindle == Spindle::Dynamic {
-                        'C'
-                    } else {
-                        'S'
-                    });
-                }
-                if self.modal.flood {
-                    accessories.push('F');
-                }
-                if self.modal.mist {
-                    accessories.push('M');
-                }
-                if !accessories.is_empty() {
-                    let _ = write!(text, "|A:{accessories}");
-                }
+            if self.modal.flood {
+                accessories.push('F');
             }
-            _ => {}
+            if self.modal.mist {
+                accessories.push('M');
+            }
+            if !accessories.is_empty() {
+                let _ = write!(text, "|A:{accessories}");
+            }
         }
         text.push('>');
-        self.reports = self.reports.wrapping_add(1);
         self.say(&text);
     }
 
@@ -97,7 +133,7 @@ impl Controller {
             cut.drive.rate_mm_min,
         ) {
             (true, Spindle::Dynamic, Some(rate)) => {
-                (self.bed.s() * speed_mm_s * 60.0 / rate).min(self.bed.s())
+                (self.bed.s() * speed_mm_s * 60.0 / rate).min(self.settings.s_max)
             }
             _ => self.bed.s(),
         }
@@ -117,15 +153,15 @@ impl Controller {
             (false, true) => "M8",
             (true, true) => "M7 M8",
         };
+        let feed = self.rate(m.feed_mm_min);
         let text = format!(
-            "[GC:G{} G{} G{} G{} G{} G94 M{spindle} {coolant} T{:.0} F{:.0} S{:.0}]",
+            "[GC:G{} G{} G{} G{} G{} G94 M{spindle} {coolant} T{:.0} F{feed} S{:.0}]",
             m.motion,
             54 + m.system,
             m.plane,
             if m.inches { 20 } else { 21 },
             if m.incremental { 91 } else { 90 },
             m.tool,
-            m.feed_mm_min,
             m.s,
         );
         self.say(&text);
@@ -134,14 +170,19 @@ impl Controller {
     /// `$#`.
     pub(super) fn offsets_report(&mut self) {
         for (k, system) in self.modal.systems.into_iter().enumerate() {
-            self.say(&format!("[G{}:{}]", 54 + k, triple(system)));
+            let text = format!("[G{}:{}]", 54 + k, self.triple(system));
+            self.say(&text);
         }
-        for name in ["G28", "G30"] {
-            self.say(&format!("[{name}:{}]", triple([0.0; 3])));
+        for (name, place) in ["G28", "G30"].into_iter().zip(self.modal.places) {
+            let text = format!("[{name}:{}]", self.triple(place));
+            self.say(&text);
         }
-        let g92 = self.modal.g92;
-        self.say(&format!("[G92:{}]", triple(g92)));
-        self.say("[TLO:0.000]");
-        self.say(&format!("[PRB:{}:0]", triple([0.0; 3])));
+        let g92 = format!("[G92:{}]", self.triple(self.modal.g92));
+        let none = self.triple([0.0; 3]);
+        let length = none.split(',').next().unwrap_or_default();
+        let (tlo, probe) = (format!("[TLO:{length}]"), format!("[PRB:{none}:0]"));
+        for text in [g92, tlo, probe] {
+            self.say(&text);
+        }
     }
 }

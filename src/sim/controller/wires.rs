@@ -55,12 +55,10 @@ impl Controller {
         self.outgoing.push_back((self.outgoing_free_s, bytes));
     }
 
-    pub(super) fn banner(&mut self) {
-        self.say("");
-        self.say("Grbl 1.1h ['$' for help]");
-        if self.state == State::Alarm {
-            self.say("[MSG:'$H'|'$X' to unlock]");
-        }
+    /// A message for a person.
+    pub(super) fn message(&mut self, text: &str) {
+        let text = self.settings.flavour.message(text);
+        self.say(&text);
     }
 
     /// The receive interrupt: realtime bytes act at once, the others wait in the buffer, or are lost.
@@ -69,17 +67,29 @@ impl Controller {
             self.lost_bytes += 1;
             return;
         }
+        if self.state == State::Sleep && !matches!(byte, 0x18 | b'?') {
+            return;
+        }
         match byte {
             0x18 => self.soft_reset(),
             b'?' => self.report_wanted = true,
             b'!' => self.hold(false),
             b'~' => self.resume(),
             0x84 => self.hold(true),
+            0x85 => self.cancel_jog(),
+            0x90..=0x9d => self.override_byte(byte),
             0x9e => self.spindle_stop(),
-            // Overrides and whatever else is not text: taken out of the stream, as the firmware does.
+            0xa0 => self.toggle_flood(),
+            // Whatever else is not text: taken out of the stream, as the firmware does.
             0x80..=0xff => {}
-            _ if self.receive.len() >= self.settings.receive_buffer => self.lost_bytes += 1,
+            _ if self.receive_free() == 0 => self.lost_bytes += 1,
             _ => self.receive.push_back(byte),
         }
+    }
+
+    /// Bytes for which the receive buffer has room.
+    pub(super) fn receive_free(&self) -> usize {
+        let usable = self.settings.flavour.usable(self.settings.receive_buffer);
+        usable.saturating_sub(self.receive.len())
     }
 }

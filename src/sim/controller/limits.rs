@@ -1,0 +1,96 @@
+//! The ends of the travel: soft limits before a motion, switches in one, and homing.
+
+use super::{Controller, State};
+
+impl Controller {
+    /// GRBL's machine space is negative: from −travel to 0.
+    pub(super) fn within_travel(&self, target: [f64; 3]) -> bool {
+        target
+            .iter()
+            .zip(self.settings.travel_mm)
+            .all(|(&t, travel)| t <= 0.0 && t >= -travel)
+    }
+
+    /// A motion would leave the travel (ALARM:2): what moves is brought to rest first.
+    pub(super) fn beyond_travel(&mut self) {
+        self.actions.clear();
+        self.answer = None;
+        self.soft_limit_hit = true;
+        if self.running.is_some() {
+            self.hold(false);
+        } else {
+            self.soft_limit_alarm();
+        }
+    }
+
+    pub(super) fn soft_limit_alarm(&mut self) {
+        self.soft_limit_hit = false;
+        self.stop_motion();
+        self.forget_program();
+        self.critical(2);
+    }
+
+    /// When the head reaches a switch at the end of its travel, on the way that it goes now, s. There are switches
+    /// where there is homing, and `$21` listens to them. A head that has passed one does not press it again.
+    pub(super) fn switch_s(&self) -> Option<f64> {
+        if !(self.settings.hard_limits && self.settings.homing) {
+            return None;
+        }
+        let running = self.running.as_ref()?;
+        let (_, cut) = self.queue.front()?;
+        let (from, to) = (self.on_bed(cut.start), self.on_bed(cut.end));
+        let place_mm = (0..3)
+            .filter_map(|k| {
+                let end = if to[k] > 0.0 {
+                    0.0
+                } else if to[k] < -self.settings.travel_mm[k] {
+                    -self.settings.travel_mm[k]
+                } else {
+                    return None;
+                };
+                let part = (end - from[k]) / (to[k] - from[k]);
+                let place_mm = part * cut.length_mm;
+                (part.is_finite() && place_mm > running.behind_mm).then_some(place_mm)
+            })
+            .fold(f64::INFINITY, f64::min);
+        let along = place_mm - running.behind_mm;
+        if along > running.profile.length_mm() {
+            return None;
+        }
+        // Place grows with time: halve the interval.
+        let (mut low, mut high) = (0.0, running.profile.duration_s());
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if running.profile.at(middle).0 < along {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Some(running.start_s + high)
+    }
+
+    /// Homing is over: the head stands at the corner that `$23` names, a little off the switches.
+    pub(super) fn homed(&mut self) {
+        let pull = self.settings.homing_pull_off_mm;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a mask of 3 bits"
+        )]
+        let mask = self.settings.homing_direction_mask as u8;
+        self.position = std::array::from_fn(|k| {
+            if mask & (1 << k) != 0 {
+                pull - self.settings.travel_mm[k]
+            } else {
+                -pull
+            }
+        });
+        self.zero = [0.0; 3];
+        self.modal.position = self.position;
+        self.state = State::Idle;
+        self.idle_delay();
+        self.starting
+            .extend(self.startup.iter().filter(|l| !l.is_empty()).cloned());
+    }
+}
