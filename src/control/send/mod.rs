@@ -28,7 +28,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::Duration;
 
 use self::connect::Facts;
-use self::link::Link;
 use super::follow::{Cuts, Follower};
 use super::journal::{Begin, Journal, Record};
 use super::reply::Status;
@@ -36,8 +35,10 @@ use super::{Job, Transport};
 use crate::base::progress::Progress;
 
 pub use error::SendError;
+pub(super) use link::Link;
 pub use options::{SendOptions, Streaming};
 pub use reason::StopReason;
+pub(super) use reason::{alarm_words, error_words};
 pub use report::{Confirmed, Proof, SendReport};
 pub use resume::{Question, resume};
 
@@ -148,12 +149,7 @@ impl<'a> Sender<'a> {
         progress: &'a dyn Progress,
     ) -> Self {
         Self {
-            link: Link {
-                transport,
-                partial: Vec::new(),
-                lines: VecDeque::new(),
-                unit_mm: 1.0,
-            },
+            link: Link::new(transport),
             job,
             options,
             progress,

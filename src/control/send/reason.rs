@@ -88,7 +88,7 @@ impl fmt::Display for StopReason {
 }
 
 /// GRBL's errors, in words for a person.
-pub(super) fn error_words(number: u32) -> &'static str {
+pub(in crate::control) fn error_words(number: u32) -> &'static str {
     match number {
         1 | 2 => "a word of it is damaged",
         8 => "it must be idle for this",
@@ -104,7 +104,7 @@ pub(super) fn error_words(number: u32) -> &'static str {
 }
 
 /// GRBL's alarms, in words for a person.
-fn alarm_words(number: u32) -> &'static str {
+pub(in crate::control) fn alarm_words(number: u32) -> &'static str {
     match number {
         1 => "a limit switch was hit; position may be lost",
         2 => "the job leaves the machine's travel",
