@@ -16,7 +16,8 @@ pub mod materials;
 pub mod ports;
 pub mod pose;
 mod profiles;
-pub mod samples;
+pub mod resume;
+mod samples;
 pub mod send;
 pub mod sheet_args;
 pub mod sim;
@@ -88,6 +89,7 @@ enum Verb {
     /// Read G-code back and judge it: bed, beam, modes, and every cut of its sheet
     Verify(verify::VerifyArgs),
     Send(send::SendArgs),
+    Resume(resume::ResumeArgs),
     Sim(sim::SimArgs),
     Ports(ports::PortsArgs),
 }
@@ -135,6 +137,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Verb::Calibrate(args) => calibrate::run(args, global, &terminal),
         Verb::Machines(args) => machines::run(args, global, &terminal),
         Verb::Send(args) => send::run(args, global, &terminal),
+        Verb::Resume(args) => resume::run(args, global, &terminal),
         Verb::Sim(args) => sim::run(args, global, &terminal),
         Verb::Ports(args) => ports::run(args, global, &terminal),
     };
