@@ -3,14 +3,34 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
 
+use std::cell::RefCell;
 use std::fmt;
+use std::time::Duration;
 
 use kagome::base::progress::Silent;
-use kagome::control::journal::{Header, History, Journal, JournalError, MemoryStore};
+use kagome::control::journal::{Header, Journal, JournalError, MemoryStore};
 use kagome::control::{
-    Cuts, Job, JobRules, Proof, Question, SendError, SendOptions, StopReason, resume, send_recorded,
+    Cuts, Job, JobRules, Question, SendOptions, Transport, resume, send_recorded,
 };
-use kagome::sim::{At, Burn, Controller, Faults, Mishap, Settings, SimTransport};
+use kagome::sim::{At, Burn, Controller, Faults, Mishap, Settings, SimTransport, State};
+
+/// One line, used by the sender and looked at by the person.
+struct Shared<'a>(&'a RefCell<SimTransport>);
+
+impl Transport for Shared<'_> {
+    fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+        self.0.borrow_mut().send(bytes)
+    }
+    fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> std::io::Result<usize> {
+        self.0.borrow_mut().receive(buffer, wait)
+    }
+    fn now(&self) -> Duration {
+        self.0.borrow().now()
+    }
+    fn name(&self) -> &str {
+        "the simulated machine"
+    }
+}
 
 type Slit = [[f64; 2]; 2];
 
@@ -136,7 +156,7 @@ impl World {
 
     fn options() -> SendOptions {
         SendOptions {
-            banner_wait: std::time::Duration::from_millis(500),
+            banner_wait: Duration::from_millis(500),
             ..SendOptions::default()
         }
     }
@@ -148,26 +168,38 @@ impl World {
             let now = machine.now_s();
             machine.advance(now + 5.0);
         }
-        let mut position_lost = matches!(fault, Fault::PowerLost | Fault::ControllerReset);
-        match self.bench {
-            Bench::Homes => {
-                if fault == Fault::PowerLost {
-                    machine.power_on([7.0, -3.0, 0.0]);
-                }
-                machine.port_opened(true);
-            }
-            Bench::Plain => {
-                // A stop in motion loses the position as well.
-                position_lost |= machine.state() == kagome::sim::State::Alarm;
-                if position_lost {
-                    // Put by hand over the zero point.
-                    let head = machine.head_mm();
-                    machine.power_on(head.map(|v| -v));
-                }
-                machine.port_opened(false);
-            }
+        if fault == Fault::PowerLost {
+            // Somebody leant on the gantry.
+            machine.power_on([7.0, -3.0, 0.0]);
+        }
+        machine.port_opened(self.bench == Bench::Homes);
+        if self.bench == Bench::Plain && matches!(machine.state(), State::Alarm | State::Critical) {
+            machine.write(b"\x18");
+            let now = machine.now_s();
+            machine.advance(now + 1.0);
+            machine.write(b"$X\n");
+            machine.advance(now + 2.0);
+            machine.read(&mut Vec::new());
         }
         machine
+    }
+
+    /// A person who does what is asked and says what is true.
+    fn answer(&self, link: &RefCell<SimTransport>, question: &Question) -> bool {
+        let mut link = link.borrow_mut();
+        let machine = link.controller_mut();
+        let head = machine.head_mm();
+        let zero = self.zero_mm();
+        match question {
+            Question::Home => true,
+            Question::ZeroHere => {
+                machine.push_head([zero[0] - head[0], zero[1] - head[1], 0.0]);
+                true
+            }
+            Question::AtReference { at_mm, .. } => {
+                (head[0] - zero[0] - at_mm[0]).hypot(head[1] - zero[1] - at_mm[1]) < 0.05
+            }
+        }
     }
 
     /// Sends, is struck, recovers and resumes, as often as there are faults; gives what is in the sheet.
@@ -180,19 +212,16 @@ impl World {
         loop {
             let fault = faults.next();
             let list = fault.map_or(Faults::default(), |(at, f)| Faults::one(at, f.mishap()));
-            let mut link = SimTransport::with_faults(machine, list);
+            let link = RefCell::new(SimTransport::with_faults(machine, list));
+            let mut line = Shared(&link);
             let bytes = store.bytes();
             let opened = Journal::continued(self.header(), &bytes, store.clone());
             let result = match opened {
                 Ok(mut journal) => {
                     outcome.resumes += 1;
-                    let mut asked = Vec::new();
-                    let mut answer = |question: &Question| {
-                        asked.push(*question);
-                        true
-                    };
+                    let mut answer = |question: &Question| self.answer(&link, question);
                     resume(
-                        &mut link,
+                        &mut line,
                         &self.job,
                         &self.cuts,
                         &Self::options(),
@@ -202,18 +231,21 @@ impl World {
                     )
                 }
                 Err(JournalError::NotBegun) => {
-                    if !link.controller().burns().is_empty() {
+                    if !link.borrow().controller().burns().is_empty() {
                         return Err("burnt without a journal".into());
                     }
                     if self.bench == Bench::Homes {
+                        let mut link = link.borrow_mut();
                         let machine = link.controller_mut();
                         machine.write(b"$H\n");
                         let now = machine.now_s();
                         machine.advance(now + 20.0);
+                    } else {
+                        self.answer(&link, &Question::ZeroHere);
                     }
                     let mut journal = Journal::new(self.header(), store.clone());
                     send_recorded(
-                        &mut link,
+                        &mut line,
                         &self.job,
                         &self.cuts,
                         &Self::options(),
@@ -222,11 +254,12 @@ impl World {
                     )
                 }
                 Err(JournalError::Finished { .. }) => {
-                    machine = link.into_controller();
+                    machine = link.into_inner().into_controller();
                     break;
                 }
                 Err(other) => return Err(other.to_string()),
             };
+            let link = link.into_inner();
             if link.controller().lost_bytes() > 0 && fault.is_none() {
                 return Err(format!("{} bytes overran", link.controller().lost_bytes()));
             }

@@ -18,7 +18,8 @@ mod port_args;
 pub mod ports;
 pub mod pose;
 mod profiles;
-pub mod samples;
+pub mod resume;
+mod samples;
 pub mod send;
 pub mod sheet_args;
 pub mod sim;
@@ -90,6 +91,7 @@ enum Verb {
     /// Read G-code back and judge it: bed, beam, modes, and every cut of its sheet
     Verify(verify::VerifyArgs),
     Send(send::SendArgs),
+    Resume(resume::ResumeArgs),
     Status(console::status::StatusArgs),
     Home(console::home::HomeArgs),
     Unlock(console::unlock::UnlockArgs),
@@ -144,6 +146,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Verb::Calibrate(args) => calibrate::run(args, global, &terminal),
         Verb::Machines(args) => machines::run(args, global, &terminal),
         Verb::Send(args) => send::run(args, global, &terminal),
+        Verb::Resume(args) => resume::run(args, global, &terminal),
         Verb::Status(args) => console::status::run(args, global, &terminal),
         Verb::Home(args) => console::home::run(args, global, &terminal),
         Verb::Unlock(args) => console::unlock::run(args, global, &terminal),

@@ -99,6 +99,7 @@ pub fn rehearse(
     let mut link = SimTransport::new(Controller::new(settings.clone()));
     let options = SendOptions {
         longest_pause: Some(Duration::from_secs(60)),
+        buffer: Some(settings.receive_buffer),
         ..SendOptions::default()
     };
     let report = send(&mut link, &job, &options, progress).map_err(Box::new)?;

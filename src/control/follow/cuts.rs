@@ -11,8 +11,9 @@ const ENGRAVED_PART: f64 = 0.25;
 const SPECK_MM: f64 = 1.0;
 /// Engraved strokes and specks that lie closer than this, mm, may be one mark.
 const NEIGHBOUR_MM: f64 = 5.0;
-/// A mark takes no further stroke once its way is so long, mm. Measured on a job with labels of 12 strokes in 8 mm: one by
-/// one, three strokes are 60 ms of work and the machine waits for the proof of each; a label at a time, it never does.
+/// A mark takes no further stroke once its way is so long, mm: about a label. Measured on a sheet of labels (12 strokes in
+/// 8 mm) and slits: with at most one unconfirmed cut, strokes one by one cost 8.9 % of the time, labels 4.9 %; from two on
+/// neither costs anything. Hatches of dots would be worse, and fill the journal.
 const MARK_MM: f64 = 10.0;
 
 /// One thing that is cut: a stretch with the beam on from where it is lit to where it goes out. Strokes of engraving and

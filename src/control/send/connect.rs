@@ -274,9 +274,11 @@ impl Sender<'_> {
                 buffer = fields.nth(2).and_then(|f| f.parse::<usize>().ok());
             }
         }
-        let Some(told) = buffer.filter(|&b| b >= 82) else {
+        // FluidNC does not tell: then the profile must.
+        let told = buffer.filter(|&b| b >= 82).or(self.options.buffer);
+        let Some(told) = told.filter(|&b| b >= 82) else {
             return Err(SendError::NotReady {
-                why: "the controller does not tell the size of its receive buffer ($I): it is not a GRBL 1.1 controller that can be streamed to"
+                why: "the controller does not tell the size of its receive buffer ($I), and neither does the machine's profile (receive_buffer_bytes): it is not known how much can be sent at once"
                     .into(),
             });
         };
