@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use kagome::base::progress::{Progress, Silent};
 use kagome::control::{
-    Console, ConsoleError, ControllerSettings, JogTo, MachineState, Move, Transport as _, work_mm,
+    Console, ConsoleError, ControllerSettings, Job, JobReach, JobRules, JogTo, MachineState, Move,
+    SendOptions, Transport as _, send, work_mm,
 };
 use kagome::sim::{Controller, Settings, SimTransport};
 
@@ -160,6 +161,82 @@ fn settings_are_saved_changed_and_put_back() {
     assert_eq!(restored.written, [11, 30, 110]);
     assert!(restored.refused.is_empty() && restored.different.is_empty());
     assert_eq!(console.settings().unwrap(), saved);
+}
+
+#[test]
+fn a_job_is_read_by_the_controller_without_motion() {
+    let good = "G21 G90 G54\nM5\nG0 X10 Y10\nM4 S500\nG1 X60 F1200\nM5\nM2\n";
+    // The sender's own check does not know how far an arc's ends may differ; the controller does.
+    let bad = good.replace("G1 X60 F1200", "G1 X60 F1200\nG2 X70 Y10 I50 J3");
+    for flavour in [kagome::sim::Flavour::Grbl, kagome::sim::Flavour::GrblHal] {
+        let mut line = machine(Settings {
+            flavour,
+            ..Settings::default()
+        });
+        let job = |text: &str| Job::check(text.as_bytes(), &JobRules::default()).unwrap();
+        let mut console = Console::open(&mut line, &Silent).unwrap();
+        console.dry_run(&job(good)).unwrap();
+        let error = console.dry_run(&job(&bad)).unwrap_err().to_string();
+        assert!(error.contains("line 6 (G2"), "{error}");
+        // It is itself again, and has not moved.
+        let status = console.status().unwrap();
+        assert_eq!(status.state, MachineState::Idle);
+        assert_eq!(status.position_mm, Some([0.0; 3]));
+        dark(&line);
+    }
+}
+
+#[test]
+fn a_job_that_would_leave_the_travel_is_not_begun() {
+    let text = "G21 G90 G54\nM5\nG0 X10 Y10\nM4 S500\nG1 X60 F1200\nM5\nM2\n";
+    let job = Job::check(text.as_bytes(), &JobRules::default()).unwrap();
+    let mut profile = kagome::machine::load("co2-600x400").unwrap();
+    profile.motion.rate_mm_per_min.x = 1234.0;
+    let options = SendOptions {
+        made_for: Some(Box::new((profile, JobReach::of(text)))),
+        ..SendOptions::default()
+    };
+    let homed = || {
+        let mut line = machine(Settings {
+            homing: true,
+            ..Settings::default()
+        });
+        Console::open(&mut line, &Silent).unwrap().home().unwrap();
+        line
+    };
+    let mut line = homed();
+    let error = send(&mut line, &job, &options, &Silent)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("kagome zero") && error.contains("Nothing was sent"),
+        "{error}"
+    );
+    dark(&line);
+    // With the zero where the sheet lies it is.
+    let mut line = homed();
+    let mut console = Console::open(&mut line, &Silent).unwrap();
+    let away = Move {
+        to: JogTo::Machine,
+        axes_mm: [Some(-400.0), Some(-400.0), None],
+        feed_mm_per_min: 6000.0,
+    };
+    console.jog(&away).unwrap();
+    console.set_zero([Some(0.0), Some(0.0), None]).unwrap();
+    let told = Notes::default();
+    send(&mut line, &job, &options, &told).unwrap();
+    let told = told.0.into_inner().unwrap();
+    assert!(told.iter().any(|t| t.contains("rate of X")), "{told:?}");
+}
+
+/// Keeps what it is told.
+#[derive(Default)]
+struct Notes(std::sync::Mutex<Vec<String>>);
+
+impl Progress for Notes {
+    fn note(&self, text: &str) {
+        self.0.lock().unwrap().push(text.to_owned());
+    }
 }
 
 #[test]

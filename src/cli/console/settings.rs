@@ -1,6 +1,6 @@
 //! `kagome settings`: the controller's own numbers, saved, compared and put back.
 
-use std::io::{BufRead as _, IsTerminal as _, Write as _};
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
@@ -9,6 +9,7 @@ use super::at_machine;
 use crate::base::atomic::write_file;
 use crate::base::progress::Progress as _;
 use crate::cli::port_args::PortArgs;
+use crate::cli::terminal::agrees;
 use crate::cli::{Failure, Global, Terminal, print, print_json};
 use crate::control::{ControllerSettings, SettingDifference};
 
@@ -137,7 +138,7 @@ fn restore(
             for line in lines(&differences) {
                 terminal.note(&line);
             }
-            agreed = ask("write these to the controller? yes or no: ");
+            agreed = agrees("write these to the controller", terminal);
         }
         if !agreed {
             return Ok(None);
@@ -203,13 +204,4 @@ fn show(differences: &[SettingDifference], global: &Global) -> Result<(), Failur
         return print("no setting differs");
     }
     print(&(lines(differences).join("\n") + "\n"))
-}
-
-/// Asks a person; anything but yes is no.
-fn ask(question: &str) -> bool {
-    let mut err = std::io::stderr();
-    let _ = write!(err, "{question}").and_then(|()| err.flush());
-    let mut line = String::new();
-    let read = std::io::stdin().lock().read_line(&mut line);
-    read.is_ok() && ["yes", "y"].contains(&line.trim().to_lowercase().as_str())
 }

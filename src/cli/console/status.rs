@@ -29,7 +29,7 @@ pub fn run(args: &StatusArgs, global: &Global, terminal: &Terminal) -> Result<()
         let status = console.status()?;
         Ok((status, told, settings, console.banner.clone()))
     })?;
-    let survey = Survey::settings(&settings, &machine);
+    let survey = Survey::settings(&|number| settings.number(number), &machine);
     if global.json {
         return print_json(&serde_json::json!({
             "state": format!("{:?}", status.state),
