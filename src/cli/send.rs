@@ -230,7 +230,7 @@ impl Ready {
             terminal.note(&line);
         }
         agrees(
-            "Is the sheet in place, the lid closed, and will you stay? begin",
+            "Does the sheet lie in its place, and will you stay beside the machine",
             terminal,
         )
     }
