@@ -495,3 +495,112 @@ fn fault_upon_fault_loses_no_slit() {
         }
     }
 }
+
+/// The program itself, killed so that nothing of it can run any more.
+#[cfg(unix)]
+mod killed {
+    use std::process::{Command, Stdio};
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+    use kagome::control::journal::{Begin, FileStore, History, path_for};
+    use kagome::sim::pty::{PtyServer, Serve};
+    use kagome::sim::strokes;
+
+    use super::*;
+
+    #[test]
+    fn a_program_that_is_killed_leaves_a_journal_to_resume_from() {
+        for (bench, kills) in [(Bench::Plain, [3, 11]), (Bench::Homes, [1, 9])] {
+            let world = World::new(16, bench, 3);
+            let folder = tempfile::tempdir().unwrap();
+            let file = folder.path().join("job.nc");
+            std::fs::write(&file, text_of(&world.slits)).unwrap();
+            let (made, over) = (
+                Arc::new(AtomicUsize::new(0)),
+                Arc::new(AtomicBool::new(false)),
+            );
+            let mut server = PtyServer::open().unwrap();
+            let path = server.path().to_owned();
+            let thread = {
+                let (made, over, mut machine) = (made.clone(), over.clone(), world.machine());
+                std::thread::spawn(move || {
+                    let how = Serve {
+                        speed: Some(4.0),
+                        once: false,
+                        reset_on_open: bench == Bench::Homes,
+                    };
+                    server.run(&mut machine, how, |m| {
+                        made.store(strokes(&m.burns(), 0.0125).len(), Ordering::SeqCst);
+                        over.load(Ordering::SeqCst)
+                    });
+                    machine
+                })
+            };
+            let start = |verb: &str| {
+                let mut command = Command::new(env!("CARGO_BIN_EXE_kagome"));
+                command.env("KAGOME_PROFILES", "").arg(verb).arg(&file);
+                command.args(["--port", &path]);
+                if verb == "resume" {
+                    command.args(["--home", "--at-reference"]);
+                }
+                command.stdout(Stdio::null()).stderr(Stdio::piped());
+                command.spawn().unwrap()
+            };
+            if bench == Bench::Homes {
+                // The port resets the board, which is then locked: a send refuses, and says so.
+                let refused = start("send").wait_with_output().unwrap();
+                let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+                assert!(said.contains("home it"), "{said}");
+            }
+            let mut verb = "send";
+            if bench == Bench::Homes {
+                // As if a first run had homed and begun.
+                begin(&world, &path_for(&file));
+                verb = "resume";
+            }
+            for kill in kills {
+                let mut child = start(verb);
+                while made.load(Ordering::SeqCst) < kill {
+                    std::thread::sleep(Duration::from_millis(3));
+                    if let Some(status) = child.try_wait().unwrap() {
+                        let output = child.wait_with_output().unwrap();
+                        panic!("{status}: {}", String::from_utf8_lossy(&output.stderr));
+                    }
+                }
+                child.kill().unwrap();
+                child.wait().unwrap();
+                let bytes = std::fs::read(path_for(&file)).unwrap();
+                let proven = History::read(&bytes).unwrap().proven;
+                assert!(proven <= kill + 3, "{proven} proven at {kill}");
+                verb = "resume";
+            }
+            let output = start("resume").wait_with_output().unwrap();
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert!(output.status.success(), "{bench:?}: {said}");
+            over.store(true, Ordering::SeqCst);
+            let mut machine = thread.join().unwrap();
+            machine.run_out(60.0);
+            assert!(!machine.beam_on());
+            let twice = world.judge(&machine.burns()).unwrap();
+            println!("{bench:?}: {twice} of 16 slits cut twice after 2 kills");
+            assert!(twice <= 3 * kills.len());
+        }
+    }
+
+    /// A journal that says: begun, homed, nothing proven.
+    fn begin(world: &World, path: &std::path::Path) {
+        let mut header = world.header();
+        header.machine.clear();
+        let mut journal = Journal::new(header, FileStore::new(path));
+        journal
+            .begin(Begin {
+                cut: 0,
+                system: "G54".into(),
+                offset_mm: [ZERO_MM[0], ZERO_MM[1], 0.0],
+                homes: true,
+                firmware: "Grbl".into(),
+            })
+            .unwrap();
+    }
+}
