@@ -1,10 +1,12 @@
 //! `kagome resume`.
 
-use std::io::{IsTerminal as _, Write as _};
+use std::io::IsTerminal as _;
 
 use clap::Args;
 
+use super::port_args::SIM;
 use super::send::{JobArgs, prepare, print};
+use super::terminal::agrees;
 use super::{Failure, Global, Terminal};
 use crate::base::progress::Progress as _;
 use crate::control::journal::{self, FileStore, Journal};
@@ -49,26 +51,19 @@ impl ResumeArgs {
             ));
             return false;
         }
-        let _ = write!(std::io::stderr(), "{question}? [y/N] ");
-        let _ = std::io::stderr().flush();
-        let mut line = String::new();
-        // A terminal that was closed says nothing, which is no.
-        let read = std::io::stdin().read_line(&mut line);
-        read.is_ok()
-            && !terminal.interrupted()
-            && matches!(line.trim().to_ascii_lowercase().as_str(), "y" | "yes")
+        agrees(&question.to_string(), terminal)
     }
 }
 
 /// Resumes.
 pub fn run(args: &ResumeArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
     let what = &args.what;
-    if what.port == "sim" {
+    let ready = prepare(what, terminal)?;
+    if ready.port == SIM {
         return Err(Failure::Bad(
             "the machine that is built in forgets its sheet when the program ends: there is nothing to resume. `kagome sim` serves one that stays".into(),
         ));
     }
-    let ready = prepare(what, terminal)?;
     let cuts = Cuts::of(&ready.job).map_err(|why| {
         Failure::Bad(format!(
             "the head cannot be followed through this job ({why}), so nobody can say where it was stopped"
@@ -84,7 +79,7 @@ pub fn run(args: &ResumeArgs, global: &Global, terminal: &Terminal) -> Result<()
     let header = ready.header(&what.job, &cuts);
     let mut journal = Journal::continued(header, &bytes, FileStore::new(&path))
         .map_err(|error| here(error.to_string()))?;
-    let report = ready.at_port(&what.port, terminal, |port| {
+    let report = ready.at_port(terminal, |port| {
         resume(
             port,
             &ready.job,

@@ -1,20 +1,24 @@
 //! `kagome send`.
 
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use super::cut::drawing_of;
+use super::port_args::{self, SIM, port_of, remember};
 use super::profiles::{machine_named, own_folder};
+use super::terminal::agrees;
 use super::{Failure, Global, Terminal};
 use crate::base::progress::Progress as _;
+use crate::base::units::short;
 use crate::control::journal::{self, FileStore, Header, History, Journal};
 use crate::control::{
-    Awake, Cuts, Job, JobRules, OpenPort, SendError, SendOptions, SendReport, Streaming, send,
-    send_recorded,
+    Awake, Console, Cuts, Job, JobReach, JobRules, SendError, SendOptions, SendReport, Streaming,
+    Transport, send, send_recorded,
 };
 use crate::machine::{self, Connection, HandOver, Machine};
-use crate::sim::{RehearsalError, RehearsalSummary, Settings, rehearse};
+use crate::sim::{RehearsalError, RehearsalSummary, Settings, estimate, rehearse};
 use crate::{gcode, pattern};
 
 /// Send a job to a machine, and stop it with proof if anything goes wrong
@@ -31,6 +35,12 @@ pub struct SendArgs {
     /// Keep no journal: a job that is stopped cannot be resumed
     #[arg(long)]
     no_journal: bool,
+    /// First have the controller read the whole job without moving ($C)
+    #[arg(long)]
+    check: bool,
+    /// Begin without being asked
+    #[arg(long, short)]
+    yes: bool,
 }
 
 /// A job and where it goes.
@@ -38,9 +48,10 @@ pub struct SendArgs {
 pub(super) struct JobArgs {
     /// The job: a G-code file
     pub job: PathBuf,
-    /// The machine's port (see `kagome ports`), or `sim` for the machine that is built in
+    /// The machine's port (see `kagome ports`): a path, usb:VID:PID, tcp://HOST:PORT, or sim for the machine that is built
+    /// in [default: the one that this machine was on last]
     #[arg(long)]
-    pub port: String,
+    port: Option<String>,
     /// The machine's profile [default: the one that the job's header names]
     #[arg(long, value_name = "NAME|FILE")]
     machine: Option<String>,
@@ -55,9 +66,6 @@ pub(super) struct JobArgs {
     #[arg(long, value_name = "S")]
     s_max: Option<f64>,
 }
-
-/// What GRBL boards use unless they were built otherwise.
-const STANDARD_BAUD: u32 = 115_200;
 
 /// The profile asked for, else the one that the job's header names, else none: G-code of other programs may come
 /// without a profile to compare with.
@@ -127,7 +135,12 @@ pub(super) struct Ready {
     pub machine: Option<Machine>,
     pub job: Job,
     pub options: SendOptions,
-    baud: u32,
+    baud: Option<u32>,
+    /// Where the machine is.
+    pub port: String,
+    /// It was named, and is to be remembered.
+    named: bool,
+    reach: Option<JobReach>,
 }
 
 impl Ready {
@@ -145,12 +158,70 @@ impl Ready {
         Header::of(&self.job, cuts, &name, machine, ahead as usize)
     }
 
+    /// What will happen, in words.
+    fn words(&self, cuts: Option<&Cuts>) -> Vec<String> {
+        let mut lines = Vec::new();
+        let s = self.job.largest_s();
+        let power = match self.options.s_max {
+            Some(s_max) => format!("up to {} % of its power", short(100.0 * s / s_max, 1)),
+            None => format!("up to S{}", short(s, 1)),
+        };
+        let mode = if self.job.constant_power() {
+            "CONSTANT (M3): it stays on if the link is lost"
+        } else {
+            "dynamic (M4): off whenever the head stands"
+        };
+        lines.push(match self.reach.and_then(|r| r.burnt_mm) {
+            Some([low, high]) => format!(
+                "will burn from X{} Y{} to X{} Y{} of the work, {power}, {mode}",
+                short(low[0], 1),
+                short(low[1], 1),
+                short(high[0], 1),
+                short(high[1], 1)
+            ),
+            None => "will burn nothing".into(),
+        });
+        let mut settings = self
+            .machine
+            .as_ref()
+            .map_or_else(Settings::default, Settings::of_machine);
+        settings.s_max = self.options.s_max.unwrap_or(settings.s_max);
+        let text = String::from_utf8_lossy(&self.text);
+        let time = estimate(&text, &settings).ok().map(|e| e.time_s);
+        let cuts = cuts.map_or_else(String::new, |c| format!("{} cuts, ", c.len()));
+        if let Some(time) = time {
+            lines.push(format!(
+                "{cuts}about {} min {} s on {}",
+                short((time / 60.0).floor(), 0),
+                short(time % 60.0, 0),
+                self.machine
+                    .as_ref()
+                    .map_or("a machine with GRBL's defaults", |m| &m.name)
+            ));
+        }
+        lines
+    }
+
+    /// Whether the person at the terminal wants it. Without one there is nobody to ask, and the call itself was the order.
+    fn agreed(&self, cuts: Option<&Cuts>, terminal: &Terminal) -> bool {
+        if !(std::io::stdin().is_terminal() && std::io::stderr().is_terminal()) {
+            return true;
+        }
+        terminal.clear();
+        for line in self.words(cuts) {
+            terminal.note(&line);
+        }
+        agrees(
+            "Is the sheet in place, the lid closed, and will you stay? begin",
+            terminal,
+        )
+    }
+
     /// Opens the port and does something over it that must be brought to its end.
     pub fn at_port<T>(
         &self,
-        port: &str,
         terminal: &Terminal,
-        work: impl FnOnce(&mut OpenPort) -> Result<T, SendError>,
+        work: impl FnOnce(&mut dyn Transport) -> Result<T, SendError>,
     ) -> Result<T, Failure> {
         // From the opening on: it resets the board, and an exit in between would leave it to itself.
         let Some(guard) = terminal.forbid_exit() else {
@@ -158,9 +229,12 @@ impl Ready {
                 "Ctrl-C cannot be caught here, so a running job could not be stopped with proof; nothing was sent".into(),
             ));
         };
-        let mut port = OpenPort::open(port, self.baud).map_err(Failure::bad)?;
+        let mut line = port_args::open(&self.port, self.baud, self.machine.as_ref())?;
+        if let Some(machine) = self.machine.as_ref().filter(|_| self.named) {
+            remember(&self.port, &machine.name, terminal);
+        }
         let awake = Awake::ask("a machine is running a job");
-        let result = work(&mut port);
+        let result = work(line.as_mut());
         drop((awake, guard));
         terminal.clear();
         result.map_err(failure)
@@ -215,8 +289,10 @@ pub(super) fn prepare(args: &JobArgs, terminal: &Terminal) -> Result<Ready, Fail
         );
     }
     let connection = machine.as_ref().and_then(|m| m.connection.as_ref());
+    let reach = JobReach::of(&String::from_utf8_lossy(&text));
     let options = SendOptions {
         s_max,
+        made_for: machine.clone().map(|m| Box::new((m, reach))),
         buffer: connection.map(|c| c.receive_buffer_bytes as usize),
         streaming: match connection.and_then(|c| c.streaming) {
             Some(HandOver::Answered) => Streaming::Answered,
@@ -224,17 +300,18 @@ pub(super) fn prepare(args: &JobArgs, terminal: &Terminal) -> Result<Ready, Fail
         },
         ..SendOptions::default()
     };
-    let baud = args
-        .baud
-        .or(connection.map(|c| c.baud))
-        .unwrap_or(STANDARD_BAUD);
+    let name = machine.as_ref().map(|m| m.name.as_str());
+    let port = port_of(args.port.as_deref(), name)?;
     Ok(Ready {
+        port,
+        named: args.port.is_some(),
+        reach,
+        baud: args.baud,
         text,
         rules,
         machine,
         job,
         options,
-        baud,
     })
 }
 
@@ -242,7 +319,7 @@ pub(super) fn prepare(args: &JobArgs, terminal: &Terminal) -> Result<Ready, Fail
 pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
     let what = &args.what;
     let ready = prepare(what, terminal)?;
-    if what.port == "sim" {
+    if ready.port == SIM {
         return rehearsal(&ready, what, global, terminal);
     }
     let cuts = match Cuts::of(&ready.job) {
@@ -256,7 +333,17 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
             None
         }
     };
-    let report = ready.at_port(&what.port, terminal, |port| {
+    if !args.yes && !ready.agreed(cuts.as_ref(), terminal) {
+        return Err(Failure::No("nothing was sent".into()));
+    }
+    let report = ready.at_port(terminal, |port| {
+        if args.check {
+            Console::open(port, terminal)
+                .and_then(|mut console| console.dry_run(&ready.job))
+                .map_err(|error| SendError::NotReady {
+                    why: error.to_string(),
+                })?;
+        }
         let Some(cuts) = &cuts else {
             return send(port, &ready.job, &ready.options, terminal);
         };

@@ -38,7 +38,6 @@ pub use send::{
     send, send_recorded,
 };
 pub use serial::{PortError, SerialTransport, ports};
-pub use stranger::words as words_of_a_stranger;
 pub use survey::{JobReach, Survey};
 pub use tcp::TcpTransport;
 pub use transport::Transport;

@@ -3,7 +3,6 @@
 //! A profile is what the job was made for: its times, its bed. What the controller would do otherwise is told before
 //! anything is sent; what would burn in the wrong place is refused.
 
-use super::ControllerSettings;
 use crate::base::units::short;
 use crate::gcode::read;
 use crate::machine::Machine;
@@ -72,8 +71,8 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// Compares a controller's settings with a machine's profile. `options` are the letters of `[OPT:…]` (`$I`).
-    pub fn settings(found: &ControllerSettings, machine: &Machine) -> Self {
+    /// Compares a controller's settings, by their numbers, with a machine's profile.
+    pub fn settings(found: &dyn Fn(u32) -> Option<f64>, machine: &Machine) -> Self {
         let mut survey = Self::default();
         let mut warn = |text: String| survey.warned.push(text);
         let far = |a: f64, b: f64| (a - b).abs() > SAME_SHARE * a.abs().max(b.abs());
@@ -96,7 +95,7 @@ impl Survey {
             (11, motion.junction_deviation_mm, "junction deviation", "mm"),
         ];
         for (number, profile, what, unit) in rates {
-            if let Some(value) = found.number(number).filter(|v| far(*v, profile)) {
+            if let Some(value) = found(number).filter(|v| far(*v, profile)) {
                 warn(format!(
                     "{what}: the controller has {} {unit} (${number}), the profile {}: times will be other than estimated",
                     short(value, 4),
@@ -109,7 +108,7 @@ impl Survey {
             (131, machine.bed.height_mm, "Y"),
         ];
         for (number, bed, axis) in sizes {
-            if let Some(travel) = found.number(number).filter(|t| *t < bed - SAME_MM) {
+            if let Some(travel) = found(number).filter(|t| *t < bed - SAME_MM) {
                 warn(format!(
                     "travel of {axis}: the controller has {} mm (${number}), the bed of the profile {} mm",
                     short(travel, 3),
@@ -117,7 +116,7 @@ impl Survey {
                 ));
             }
         }
-        match (found.number(22), machine.homing.enabled) {
+        match (found(22), machine.homing.enabled) {
             (Some(0.0), true) => warn(
                 "homing is switched off ($22=0), and the profile says that the machine homes: after a lost position it must be found by hand".into(),
             ),
@@ -126,7 +125,7 @@ impl Survey {
             ),
             _ => {}
         }
-        if found.number(22).is_some_and(|v| v != 0.0) && found.number(20) == Some(0.0) {
+        if found(22).is_some_and(|v| v != 0.0) && found(20) == Some(0.0) {
             warn(
                 "soft limits are off ($20=0): a job that leaves the travel runs into the frame"
                     .into(),
@@ -138,24 +137,25 @@ impl Survey {
     /// Sees whether a job stays within a homed machine's travel, with the work offset (mm) in force. `options` are the
     /// letters of `[OPT:…]`: `Z` means that homed axes may begin at 0.
     ///
-    /// GRBL 1.1 puts a homed axis at the upper end of −travel to 0; with `Z` one that homes towards its negative end (`$23`) at
-    /// the lower end of 0 to travel.
+    /// GRBL 1.1 puts a homed axis at the upper end of −travel to 0; with `Z`, or with bit 3 of grblHAL's `$22`, one that homes
+    /// towards its negative end (`$23`) at the lower end of 0 to travel.
     pub fn travel(
         &mut self,
-        found: &ControllerSettings,
+        found: &dyn Fn(u32) -> Option<f64>,
         options: &str,
         reach: &JobReach,
         offset_mm: [f64; 3],
     ) {
-        if found.number(22).is_none_or(|v| v == 0.0) {
+        if found(22).is_none_or(|v| v == 0.0) {
             return;
         }
-        let mask = found.number(23).unwrap_or(0.0) as u32;
+        let mask = found(23).unwrap_or(0.0) as u32;
         for (axis, number) in [(0, 130), (1, 131)] {
-            let Some(travel) = found.number(number).filter(|t| *t > 0.0) else {
+            let Some(travel) = found(number).filter(|t| *t > 0.0) else {
                 continue;
             };
-            let upwards = options.contains('Z') && mask & (1 << axis) != 0;
+            let from_zero = options.contains('Z') || found(22).unwrap_or(0.0) as u32 & 8 != 0;
+            let upwards = from_zero && mask & (1 << axis) != 0;
             let [low, high] = if upwards {
                 [0.0, travel]
             } else {
@@ -180,8 +180,9 @@ impl Survey {
 mod tests {
     use super::*;
 
-    fn controller(text: &str) -> ControllerSettings {
-        ControllerSettings::parse("$$", text).unwrap()
+    fn controller(text: &str) -> impl Fn(u32) -> Option<f64> + use<> {
+        let found = crate::control::ControllerSettings::parse("$$", text).unwrap();
+        move |number| found.number(number)
     }
 
     #[test]
@@ -215,8 +216,9 @@ mod tests {
         assert_eq!(reach.burnt_mm, Some([[10.0, 20.0], [110.0, 60.0]]));
         assert_eq!(reach.feed_mm_per_min, 1200.0);
         assert_eq!(JobReach::of("G21\nM5\n"), None);
-        let found = controller("$22=1\n$23=3\n$130=600\n$131=400\n");
         let refused = |options: &str, offset: [f64; 3]| {
+            let homes = if options == "hal" { 9 } else { 1 };
+            let found = controller(&format!("$22={homes}\n$23=3\n$130=600\n$131=400\n"));
             let mut survey = Survey::default();
             survey.travel(&found, options, &reach, offset);
             survey.refused.len()
@@ -229,6 +231,7 @@ mod tests {
         // Built to begin at 0.
         assert_eq!(refused("VZ", [0.0; 3]), 0);
         assert_eq!(refused("VZ", [491.0, 0.0, 0.0]), 1);
+        assert_eq!(refused("hal", [0.0; 3]), 0);
         // Without homing nobody knows.
         let mut survey = Survey::default();
         survey.travel(&controller("$22=0\n$130=1\n"), "V", &reach, [0.0; 3]);

@@ -127,6 +127,9 @@ impl Console<'_> {
             ));
         };
         self.dark()?;
+        if self.progress.interrupted() {
+            return Err(ConsoleError::Interrupted("nothing was moved".into()));
+        }
         self.command(&line, ANSWER, |_| Ok(()))?;
         self.until_idle("the jog", &[0x85])
     }

@@ -5,6 +5,7 @@
 //! and resets a homing cycle, which knows no other end.
 
 mod act;
+mod dry_run;
 mod settings;
 
 use std::io;

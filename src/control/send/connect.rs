@@ -7,6 +7,9 @@ use std::time::Duration;
 use super::reason::error_words;
 use super::{ANSWER, RESET, SendError, Sender};
 use crate::control::reply::{MachineState, Reply, Status, triple};
+use crate::control::stranger;
+use crate::control::survey::Survey;
+use crate::machine;
 
 /// The largest receive buffer believed, bytes: what grblHAL and FluidNC boards tell at the most.
 const LARGEST_BUFFER: usize = 1024;
@@ -94,7 +97,7 @@ impl Sender<'_> {
                     self.hear_out()?;
                     return Ok(Some(text));
                 }
-                Reply::Unknown(text) => *heard = format!("it says {text:?}"),
+                Reply::Unknown(text) => *heard = stranger::words(&text),
                 _ => {}
             }
         }
@@ -184,7 +187,7 @@ impl Sender<'_> {
     /// Is this the controller, set as the job needs it?
     pub(super) fn preflight(&mut self, firmware: String) -> Result<Facts, SendError> {
         let not_ready = |why: String| Err(SendError::NotReady { why });
-        let buffer = self.ask_buffer()?;
+        let (buffer, letters) = self.ask_buffer()?;
         let mut settings = BTreeMap::new();
         for reply in self.ask("$$")? {
             if let Reply::Setting(number, value) = reply {
@@ -238,7 +241,35 @@ impl Sender<'_> {
         if self.cuts.is_some_and(|cuts| !cuts.is_empty()) {
             self.locate(&mut facts)?;
         }
+        self.survey(&setting, &letters, &facts)?;
         Ok(facts)
+    }
+
+    /// Tells what is set otherwise than the machine's profile says, and refuses a job that would leave the travel.
+    fn survey(
+        &self,
+        setting: &dyn Fn(u32) -> Option<f64>,
+        letters: &str,
+        facts: &Facts,
+    ) -> Result<(), SendError> {
+        let Some((machine, reach)) = self.options.made_for.as_deref() else {
+            return Ok(());
+        };
+        let mut survey = Survey::settings(setting, machine);
+        // FluidNC has each axis's range in a file of its own.
+        let tells_travel = machine.controller != machine::Controller::FluidNc;
+        if let Some(reach) = reach.as_ref().filter(|_| tells_travel)
+            && facts.position_mm.is_some()
+        {
+            survey.travel(setting, letters, reach, facts.offset_mm);
+        }
+        for warning in &survey.warned {
+            self.progress.note(&format!("warning: {warning}"));
+        }
+        match survey.refused.first() {
+            None => Ok(()),
+            Some(why) => Err(SendError::NotReady { why: why.clone() }),
+        }
     }
 
     /// Where the job's zero point lies, and where the head stands.
@@ -263,15 +294,17 @@ impl Sender<'_> {
         Ok(())
     }
 
-    /// The size of the controller's receive buffer, as far as it is believed.
-    fn ask_buffer(&mut self) -> Result<usize, SendError> {
+    /// The size of the controller's receive buffer, as far as it is believed, and the letters of its build options.
+    fn ask_buffer(&mut self) -> Result<(usize, String), SendError> {
         let mut buffer = None;
+        let mut letters = String::new();
         for reply in self.ask("$I")? {
             if let Reply::Message(text) = reply
                 && let Some(options) = text.strip_prefix("[OPT:")
             {
                 let mut fields = options.trim_end_matches(']').split(',');
-                buffer = fields.nth(2).and_then(|f| f.parse::<usize>().ok());
+                fields.next().unwrap_or("").clone_into(&mut letters);
+                buffer = fields.nth(1).and_then(|f| f.parse::<usize>().ok());
             }
         }
         // FluidNC does not tell: then the profile must.
@@ -284,10 +317,10 @@ impl Sender<'_> {
         };
         // One byte less than told: grblHAL tells the size of a ring that holds one less. And never more than the
         // profile says, nor more than any of these boards has: a damaged number must not overrun the real buffer.
-        Ok(told
+        let believed = told
             .min(self.options.buffer.unwrap_or(LARGEST_BUFFER))
-            .min(LARGEST_BUFFER)
-            - 1)
+            .min(LARGEST_BUFFER);
+        Ok((believed - 1, letters))
     }
 
     /// The beam must be off before the job, and no startup block may light it after a reset: blocks run after every

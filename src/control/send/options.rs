@@ -2,6 +2,9 @@
 
 use std::time::Duration;
 
+use crate::control::survey::JobReach;
+use crate::machine::Machine;
+
 /// How lines are handed over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Streaming {
@@ -19,6 +22,8 @@ pub struct SendOptions {
     pub s_max: Option<f64>,
     /// The controller's receive buffer as its profile has it, bytes; the smaller of this and what it tells is used.
     pub buffer: Option<usize>,
+    /// The machine that the job was made for, and where the job goes: the controller is compared with them.
+    pub made_for: Option<Box<(Machine, Option<JobReach>)>>,
     /// How long to wait for the controller's banner after the port was opened, before it is reset. Boards that reset
     /// by themselves need up to 2 s for their boot loader.
     pub banner_wait: Duration,
@@ -39,6 +44,7 @@ impl Default for SendOptions {
         Self {
             s_max: None,
             buffer: None,
+            made_for: None,
             banner_wait: Duration::from_secs(2),
             poll: Duration::from_millis(100),
             streaming: Streaming::Counted,
