@@ -8,11 +8,12 @@ use std::fmt;
 use std::time::Duration;
 
 use kagome::base::progress::Silent;
+use kagome::base::random::Random;
 use kagome::control::journal::{Header, Journal, JournalError, MemoryStore};
 use kagome::control::{
     Cuts, Job, JobRules, Question, SendOptions, Transport, resume, send_recorded,
 };
-use kagome::sim::{At, Burn, Controller, Faults, Mishap, Settings, SimTransport, State};
+use kagome::sim::{At, Burn, Controller, Faults, Flavour, Mishap, Settings, SimTransport, State};
 
 /// One line, used by the sender and looked at by the person.
 struct Shared<'a>(&'a RefCell<SimTransport>);
@@ -98,6 +99,7 @@ struct World {
     job: Job,
     cuts: Cuts,
     bench: Bench,
+    flavour: Flavour,
     ahead: usize,
 }
 
@@ -121,6 +123,7 @@ impl World {
             job,
             cuts,
             bench,
+            flavour: Flavour::Grbl,
             ahead,
         }
     }
@@ -143,7 +146,7 @@ impl World {
             homing_seek_mm_min: 30_000.0,
             ..Settings::default()
         };
-        let mut machine = Controller::new(settings);
+        let mut machine = Controller::new(settings.with_flavour(self.flavour));
         if self.bench == Bench::Homes {
             machine.write(b"$H\n");
             machine.advance(20.0);
@@ -156,6 +159,8 @@ impl World {
 
     fn options() -> SendOptions {
         SendOptions {
+            // FluidNC does not tell it.
+            buffer: Some(128),
             banner_wait: Duration::from_millis(500),
             ..SendOptions::default()
         }
@@ -470,13 +475,23 @@ fn sampled_bytes_of_a_thousand_slits_lose_none() {
     sweep(40, 1, 29, &[Bench::Homes, Bench::Plain]);
 }
 
-/// A resume is resumed.
+/// A resume is resumed, on every firmware.
 #[test]
 fn fault_upon_fault_loses_no_slit() {
-    let mut random = kagome::base::random::Random::new(11);
-    for bench in [Bench::Homes, Bench::Plain] {
-        let world = World::new(30, bench, 2);
-        for _ in 0..40 {
+    let mut random = Random::new(11);
+    for (bench, flavour) in [
+        (Bench::Homes, Flavour::Grbl),
+        (Bench::Plain, Flavour::Grbl),
+        (Bench::Homes, Flavour::GrblHal),
+        (Bench::Plain, Flavour::GrblHal),
+        (Bench::Homes, Flavour::FluidNc),
+        (Bench::Plain, Flavour::FluidNc),
+    ] {
+        let world = World {
+            flavour,
+            ..World::new(30, bench, 2)
+        };
+        for _ in 0..20 {
             let faults: Vec<(At, Fault)> = (0..4)
                 .map(|_| {
                     let at = 200 + random.bits() % 900;
@@ -490,10 +505,52 @@ fn fault_upon_fault_loses_no_slit() {
                 })
                 .collect();
             if let Err(error) = world.live(&faults, 9) {
-                panic!("{bench:?} {faults:?}: {error}");
+                panic!("{bench:?} {flavour:?} {faults:?}: {error}");
             }
         }
     }
+}
+
+/// Late, broken up and gathered answers, and pieces that set out late: nothing overruns, nothing is missed.
+fn shaken(seeds: std::ops::Range<u64>) {
+    for seed in seeds {
+        let mut random = Random::new(seed);
+        let bench = [Bench::Homes, Bench::Plain][(seed % 2) as usize];
+        let world = World::new(12, bench, 1 + (seed % 3) as usize);
+        let faults = Faults {
+            late_s: random.between(0.0, 0.4),
+            late_sent_s: random.between(0.0, 0.2),
+            gather_s: [0.0, 0.016, 0.1][(random.bits() % 3) as usize],
+            seed,
+            ..Faults::default()
+        };
+        let store = MemoryStore::default();
+        let mut journal = Journal::new(world.header(), store);
+        let mut link = SimTransport::with_faults(world.machine(), faults);
+        let report = send_recorded(
+            &mut link,
+            &world.job,
+            &world.cuts,
+            &World::options(),
+            &Silent,
+            &mut journal,
+        )
+        .unwrap();
+        assert_eq!((report.cuts, link.controller().lost_bytes()), (12, 0));
+        assert!(report.max_in_flight < 128);
+        assert_eq!(world.judge(&link.controller().burns()), Ok(0));
+    }
+}
+
+#[test]
+fn a_shaken_line_changes_nothing_but_time() {
+    shaken(0..60);
+}
+
+#[test]
+#[ignore = "slow: run by .ci/run in release"]
+fn a_thousand_seeds_of_a_shaken_line_change_nothing_but_time() {
+    shaken(0..1000);
 }
 
 /// The program itself, killed so that nothing of it can run any more.
