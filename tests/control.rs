@@ -134,7 +134,15 @@ fn an_unplugged_job_ends_dark_and_within_its_path_wherever_the_cable_is_cut() {
             };
             let faults = Faults::one(at_byte, Mishap::Unplug);
             let mut link = SimTransport::with_faults(machine(), faults);
-            let error = run(&mut link, &text).expect_err("the cable was cut");
+            let error = match run(&mut link, &text) {
+                Err(error) => error,
+                // The answer to a question that nobody needed any more.
+                Ok(_) => {
+                    assert!(!sending && at + 80 > total, "cut at {at} of {total}");
+                    equal(&cuts, &drain(link).burns());
+                    continue;
+                }
+            };
             match error {
                 SendError::Connect { .. } => {}
                 SendError::LinkLost { confirmed, .. } => {
@@ -377,7 +385,8 @@ fn a_panic_while_sending_puts_the_beam_out() {
     let now = machine.now_s();
     machine.advance(now + 0.001);
     assert!(!machine.beam_on());
-    assert_eq!(machine.state(), State::Alarm);
+    // Held before it was reset: it still knows where it is.
+    assert_eq!(machine.state(), State::Idle);
 }
 
 #[test]

@@ -327,3 +327,109 @@ fn a_sheet_that_the_strips_do_not_vouch_for_is_refused() {
         assert!(!bench.path("x").exists());
     }
 }
+
+#[test]
+fn the_whole_evening_is_rehearsed_on_a_material_that_nobody_told() {
+    let bench = Bench::new();
+    let json = |folder: &str, more: &str| -> serde_json::Value {
+        let line = format!("--json -q calibrate rehearse -o {folder} {more}");
+        let output = bench.run(&line);
+        assert_eq!(output.status.code(), Some(0), "{line}\n{output:?}");
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let value = json("a", "--more-kerf 0.03");
+    let number = |path: &str| {
+        value
+            .pointer(path)
+            .and_then(serde_json::Value::as_f64)
+            .unwrap()
+    };
+    assert_eq!(value["readings"]["strip"].as_array().unwrap().len(), 6);
+    // Calipers found the kerf that was hidden, and the fit a bound that holds.
+    let kerf = number("/machines/0/kerf/kerf_mm");
+    assert!((kerf - number("/hidden/kerf_mm")).abs() < 0.02, "{kerf}");
+    let (bound, best) = (number("/strips/bound/sigma"), number("/hidden/bound"));
+    assert!(bound < best && bound > 0.8 * best, "{bound} {best}");
+    assert!(number("/hidden/survival") > 0.9);
+    assert!(number("/sheet/survival") > 0.9 && number("/sheet/widest") > 1.1);
+    assert!(number("/sheet/survived") > 0.9 * number("/sheet/sheets"));
+    // Nothing was put among the profiles of the person who rehearsed.
+    assert!(!bench.path("own").exists());
+    let profile = load(&bench.path("a/profiles/leather-1.6-measured.toml"));
+    assert_eq!(profile.sigma.sample.len(), 6);
+    let guide = bench.text("a/coupon/guide.html");
+    let shown = format!("σ = {}", (bound * 1000.0).round() / 1000.0);
+    assert!(
+        guide.contains(&shown) && guide.contains("<figure class=\"fit\">"),
+        "{shown}"
+    );
+    for file in ["coupon/strips.nc", "coupon/readings.toml", "sheet/job.nc"] {
+        assert!(bench.path("a").join(file).exists(), "{file}");
+    }
+    // The sheet is one that anybody can make from what lies there.
+    bench.says(0, "make a/sheet/design.toml -o again");
+    let bytes = |name: &str| std::fs::read(bench.path(name)).unwrap();
+    assert!(bytes("again/job.nc") == bytes("a/sheet/job.nc"));
+
+    // The same seed, the same evening; an earlier one is not overwritten by mistake.
+    let said = bench.says(2, "calibrate rehearse -o a");
+    assert!(said.contains("--force"), "{said}");
+    let mut other = json("b", "--more-kerf 0.03");
+    other["written"] = value["written"].clone();
+    assert_eq!(other, value);
+    json("a", "--seed 5 --force");
+    assert!(bench.text("a/coupon/readings.csv") != bench.text("b/coupon/readings.csv"));
+    // Without the strips of the evening before.
+    let profile = load(&bench.path("a/profiles/leather-1.6-measured.toml"));
+    assert_eq!(profile.sigma.sample.len(), 6);
+
+    // A material that bears nothing: no, with the reason, and no profile.
+    let said = bench.says(1, "calibrate rehearse -o none --hidden-sigma 1.03");
+    assert!(said.contains("first mark"), "{said}");
+    assert!(!bench.path("none/profiles").exists());
+    for (line, words) in [
+        ("calibrate rehearse -o x --spread 90", "--spread"),
+        ("calibrate rehearse -o x --confidence 0.2", "between 0.5"),
+        (
+            "calibrate rehearse -o x --machine plasma-generic",
+            "plasma-generic",
+        ),
+    ] {
+        let said = bench.says(2, line);
+        assert!(said.contains(words), "{line}: {said}");
+        assert!(!bench.path("x").exists());
+    }
+}
+
+#[test]
+fn a_coupon_that_cannot_be_is_refused_and_nothing_is_written() {
+    let bench = Bench::new();
+    for (line, words) in [
+        ("--stock 60x40", "--stock"),
+        ("--hinge-width 0", "hinge width"),
+        ("--hinge-width 9 --edge 10", "A1"),
+        ("--edge 0.1", "edge"),
+        (
+            "--hinge-width 1,1.1,1.2,1.3,1.4,1.5,1.6,1.7 --edge 7,8,9,10,11,12",
+            "strips",
+        ),
+        ("--material steel-1.5", "steel-1.5"),
+        ("--material nothing", "nothing"),
+        ("--machine nothing", "nothing"),
+    ] {
+        let said = bench.says(2, &format!("calibrate coupon {line} -o x"));
+        assert!(said.contains(words), "{line}: {said}");
+        assert!(!bench.path("x").exists());
+    }
+    // What finds no room is told of, and the rest is made.
+    let said = bench.says(0, "calibrate coupon --stock 230x160 -o small");
+    assert!(said.contains("warning: no room"), "{said}");
+    let text = bench.text("small/coupon.toml");
+    let coupon = kagome::calibrate::Coupon::parse("coupon.toml", &text).unwrap();
+    assert!((3..6).contains(&coupon.strip.len()));
+    // A coupon whose readings are there is evidence.
+    bench.write("small/readings.toml", "");
+    let said = bench.says(2, "calibrate coupon --force -o small");
+    assert!(said.contains("readings"), "{said}");
+    assert_eq!(bench.text("small/coupon.toml"), text);
+}

@@ -334,6 +334,16 @@ impl Calibration {
         Ok(self.at(geometry)?.survival(&demand, widest))
     }
 
+    /// Probability that no hinge of a sheet fails at a σ, under the less favourable law: what [`Calibration::bound`] compares
+    /// with its confidence.
+    ///
+    /// # Errors
+    /// [`Refusal`]: a geometry far from the strips.
+    pub fn chance(&self, geometry: &Geometry, demand: &Demand, sigma: f64) -> Result<f64, Refusal> {
+        let sigma = sigma.clamp(1.0, geometry.most_opening());
+        Ok(self.at(geometry)?.survival(demand, sigma))
+    }
+
     /// The margin that a region of a sheet keeps: its own bound, as if it were alone, less its widest opening. Negative
     /// where a hinge may fail with more than the allowed probability.
     ///

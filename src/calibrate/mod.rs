@@ -42,8 +42,10 @@
 //! # Readings
 //!
 //! What a maker wrote down beside a [`Coupon`], as CSV or TOML, becomes [`Readings`], `readings.toml`: checked, with what
-//! looks wrong as [`Doubt`]s, and with the hinges as wide as they really are under the kerf that was measured.
+//! looks wrong as [`Doubt`]s, and with the hinges as wide as they really are under the kerf that was measured. A
+//! [`SimulatedBench`] writes down what it reads from a coupon, so that the whole evening can be rehearsed.
 
+mod bench;
 mod bound;
 mod coupon;
 mod fit;
@@ -58,6 +60,7 @@ mod simulated;
 #[cfg(test)]
 mod tests;
 
+pub use bench::SimulatedBench;
 pub use bound::{Bound, CONFIDENCES, Caution, Demand, StoppedBy};
 pub use coupon::{
     Coupon, CouponError, CouponJob, CouponPlan, CouponWish, GAUGE_STEP, KerfPiece, MOST_STRIPS,

@@ -4,6 +4,7 @@
 //! machines), everything else to standard error.
 
 pub mod calibrate;
+pub mod console;
 pub mod cut;
 pub mod flatten;
 pub mod form;
@@ -13,10 +14,12 @@ pub mod layout_args;
 pub mod machines;
 pub mod make;
 pub mod materials;
+mod port_args;
 pub mod ports;
 pub mod pose;
 mod profiles;
-pub mod samples;
+pub mod resume;
+mod samples;
 pub mod send;
 pub mod sheet_args;
 pub mod sim;
@@ -88,6 +91,14 @@ enum Verb {
     /// Read G-code back and judge it: bed, beam, modes, and every cut of its sheet
     Verify(verify::VerifyArgs),
     Send(send::SendArgs),
+    Resume(resume::ResumeArgs),
+    Status(console::status::StatusArgs),
+    Home(console::home::HomeArgs),
+    Unlock(console::unlock::UnlockArgs),
+    Jog(console::jog::JogArgs),
+    Zero(console::zero::ZeroArgs),
+    Frame(console::frame::FrameArgs),
+    Settings(console::settings::SettingsArgs),
     Sim(sim::SimArgs),
     Ports(ports::PortsArgs),
 }
@@ -135,6 +146,14 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Verb::Calibrate(args) => calibrate::run(args, global, &terminal),
         Verb::Machines(args) => machines::run(args, global, &terminal),
         Verb::Send(args) => send::run(args, global, &terminal),
+        Verb::Resume(args) => resume::run(args, global, &terminal),
+        Verb::Status(args) => console::status::run(args, global, &terminal),
+        Verb::Home(args) => console::home::run(args, global, &terminal),
+        Verb::Unlock(args) => console::unlock::run(args, global, &terminal),
+        Verb::Jog(args) => console::jog::run(args, global, &terminal),
+        Verb::Zero(args) => console::zero::run(args, global, &terminal),
+        Verb::Frame(args) => console::frame::run(args, global, &terminal),
+        Verb::Settings(args) => console::settings::run(args, global, &terminal),
         Verb::Sim(args) => sim::run(args, global, &terminal),
         Verb::Ports(args) => ports::run(args, global, &terminal),
     };

@@ -1,16 +1,24 @@
 //! `kagome send`.
 
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use super::cut::drawing_of;
+use super::port_args::{self, SIM, port_of, remember};
 use super::profiles::{machine_named, own_folder};
+use super::terminal::agrees;
 use super::{Failure, Global, Terminal};
 use crate::base::progress::Progress as _;
-use crate::control::{Job, JobRules, SendError, SendOptions, SendReport, SerialTransport, send};
-use crate::machine::{self, Machine};
-use crate::sim::{RehearsalError, RehearsalSummary, Settings, rehearse};
+use crate::base::units::short;
+use crate::control::journal::{self, FileStore, Header, History, Journal};
+use crate::control::{
+    Awake, Console, Cuts, Job, JobReach, JobRules, SendError, SendOptions, SendReport, Streaming,
+    Transport, send, send_recorded,
+};
+use crate::machine::{self, Connection, HandOver, Machine};
+use crate::sim::{RehearsalError, RehearsalSummary, Settings, estimate, rehearse};
 use crate::{gcode, pattern};
 
 /// Send a job to a machine, and stop it with proof if anything goes wrong
@@ -18,13 +26,32 @@ use crate::{gcode, pattern};
 #[command(after_help = "Examples:\n  \
     kagome send mask/job.nc --port sim\n  \
     kagome send mask/job.nc --port /dev/ttyUSB0\n\n\
-    Ctrl-C holds the machine, resets it, and waits until it reports that the beam is off.")]
+    Ctrl-C holds the machine, resets it, and waits until it reports that the beam is off.\n\
+    What is proven to be cut stands in a journal beside the job (job.nc.journal): after Ctrl-C, a pulled cable, a crash or \
+    a power cut `kagome resume` goes on from there.")]
 pub struct SendArgs {
-    /// The job: a G-code file
-    job: PathBuf,
-    /// The machine's port (see `kagome ports`), or `sim` for the machine that is built in
+    #[command(flatten)]
+    what: JobArgs,
+    /// Keep no journal: a job that is stopped cannot be resumed
     #[arg(long)]
-    port: String,
+    no_journal: bool,
+    /// First have the controller read the whole job without moving ($C)
+    #[arg(long)]
+    check: bool,
+    /// Begin without being asked
+    #[arg(long, short)]
+    yes: bool,
+}
+
+/// A job and where it goes.
+#[derive(Args, Debug)]
+pub(super) struct JobArgs {
+    /// The job: a G-code file
+    pub job: PathBuf,
+    /// The machine's port (see `kagome ports`): a path, usb:VID:PID, tcp://HOST:PORT, or sim for the machine that is built
+    /// in [default: the one that this machine was on last]
+    #[arg(long)]
+    port: Option<String>,
     /// The machine's profile [default: the one that the job's header names]
     #[arg(long, value_name = "NAME|FILE")]
     machine: Option<String>,
@@ -39,9 +66,6 @@ pub struct SendArgs {
     #[arg(long, value_name = "S")]
     s_max: Option<f64>,
 }
-
-/// What GRBL boards use unless they were built otherwise.
-const STANDARD_BAUD: u32 = 115_200;
 
 /// The profile asked for, else the one that the job's header names, else none: G-code of other programs may come
 /// without a profile to compare with.
@@ -68,7 +92,7 @@ pub(super) fn machine_for(asked: Option<&str>, job: &[u8]) -> Result<Option<Mach
 }
 
 /// The job must be good for the machine, and cut its sheet if the drawing lies beside it: what `verify` would say.
-fn check_job(path: &Path, text: &[u8], machine: &Machine, args: &SendArgs) -> Result<(), Failure> {
+fn check_job(path: &Path, text: &[u8], machine: &Machine, args: &JobArgs) -> Result<(), Failure> {
     let text = String::from_utf8_lossy(text);
     // Only our own jobs belong to the drawing beside them.
     let ours = gcode::machine_of(&text).is_some();
@@ -104,8 +128,121 @@ fn check_job(path: &Path, text: &[u8], machine: &Machine, args: &SendArgs) -> Re
 /// Findings shown; `verify` shows the rest.
 const SHOWN: usize = 5;
 
-/// Sends a job.
-pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
+/// A job that may be sent, and how.
+pub(super) struct Ready {
+    text: Vec<u8>,
+    rules: JobRules,
+    pub machine: Option<Machine>,
+    pub job: Job,
+    pub options: SendOptions,
+    baud: Option<u32>,
+    /// Where the machine is.
+    pub port: String,
+    /// It was named, and is to be remembered.
+    named: bool,
+    reach: Option<JobReach>,
+}
+
+impl Ready {
+    /// The journal's first lines.
+    pub fn header(&self, path: &Path, cuts: &Cuts) -> Header {
+        let ahead = self
+            .machine
+            .as_ref()
+            .and_then(|m| m.connection.as_ref()?.max_unconfirmed_cuts)
+            .unwrap_or(Connection::UNCONFIRMED_CUTS);
+        let name = path
+            .file_name()
+            .map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        let machine = self.machine.as_ref().map_or("", |m| &m.name);
+        Header::of(&self.job, cuts, &name, machine, ahead as usize)
+    }
+
+    /// What will happen, in words.
+    fn words(&self, cuts: Option<&Cuts>) -> Vec<String> {
+        let mut lines = Vec::new();
+        let s = self.job.largest_s();
+        let power = match self.options.s_max {
+            Some(s_max) => format!("up to {} % of its power", short(100.0 * s / s_max, 1)),
+            None => format!("up to S{}", short(s, 1)),
+        };
+        let mode = if self.job.constant_power() {
+            "CONSTANT (M3): it stays on if the link is lost"
+        } else {
+            "dynamic (M4): off whenever the head stands"
+        };
+        lines.push(match self.reach.and_then(|r| r.burnt_mm) {
+            Some([low, high]) => format!(
+                "will burn from X{} Y{} to X{} Y{} of the work, {power}, {mode}",
+                short(low[0], 1),
+                short(low[1], 1),
+                short(high[0], 1),
+                short(high[1], 1)
+            ),
+            None => "will burn nothing".into(),
+        });
+        let mut settings = self
+            .machine
+            .as_ref()
+            .map_or_else(Settings::default, Settings::of_machine);
+        settings.s_max = self.options.s_max.unwrap_or(settings.s_max);
+        let text = String::from_utf8_lossy(&self.text);
+        let time = estimate(&text, &settings).ok().map(|e| e.time_s);
+        let cuts = cuts.map_or_else(String::new, |c| format!("{} cuts, ", c.len()));
+        if let Some(time) = time {
+            lines.push(format!(
+                "{cuts}about {} min {} s on {}",
+                short((time / 60.0).floor(), 0),
+                short(time % 60.0, 0),
+                self.machine
+                    .as_ref()
+                    .map_or("a machine with GRBL's defaults", |m| &m.name)
+            ));
+        }
+        lines
+    }
+
+    /// Whether the person at the terminal wants it. Without one there is nobody to ask, and the call itself was the order.
+    fn agreed(&self, cuts: Option<&Cuts>, terminal: &Terminal) -> bool {
+        if !(std::io::stdin().is_terminal() && std::io::stderr().is_terminal()) {
+            return true;
+        }
+        terminal.clear();
+        for line in self.words(cuts) {
+            terminal.note(&line);
+        }
+        agrees(
+            "Is the sheet in place, the lid closed, and will you stay? begin",
+            terminal,
+        )
+    }
+
+    /// Opens the port and does something over it that must be brought to its end.
+    pub fn at_port<T>(
+        &self,
+        terminal: &Terminal,
+        work: impl FnOnce(&mut dyn Transport) -> Result<T, SendError>,
+    ) -> Result<T, Failure> {
+        // From the opening on: it resets the board, and an exit in between would leave it to itself.
+        let Some(guard) = terminal.forbid_exit() else {
+            return Err(Failure::Bad(
+                "Ctrl-C cannot be caught here, so a running job could not be stopped with proof; nothing was sent".into(),
+            ));
+        };
+        let mut line = port_args::open(&self.port, self.baud, self.machine.as_ref())?;
+        if let Some(machine) = self.machine.as_ref().filter(|_| self.named) {
+            remember(&self.port, &machine.name, terminal);
+        }
+        let awake = Awake::ask("a machine is running a job");
+        let result = work(line.as_mut());
+        drop((awake, guard));
+        terminal.clear();
+        result.map_err(failure)
+    }
+}
+
+/// Reads a job and its machine's profile, and judges the one by the other.
+pub(super) fn prepare(args: &JobArgs, terminal: &Terminal) -> Result<Ready, Failure> {
     let text = std::fs::read(&args.job).map_err(|error| {
         Failure::Bad(format!(
             "cannot read {}: {error}; nothing was sent",
@@ -133,11 +270,10 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
     let s_max = args
         .s_max
         .or(machine.as_ref().and_then(|m| Some(m.laser()?.s_max)));
-    let here = |error| Failure::Bad(format!("{}: {error}", args.job.display()));
+    // First the plain faults, in the sender's words.
+    let job = Job::check(&text, &rules)
+        .map_err(|error| Failure::Bad(format!("{}: {error}", args.job.display())))?;
     if let Some(machine) = &machine {
-        // First the plain faults, in the sender's words.
-        Job::check(&text, &rules)
-            .map_err(|error| Failure::Bad(format!("{}: {error}", args.job.display())))?;
         check_job(&args.job, &text, machine, args)?;
         if let Some(made_for) = gcode::machine_of(&String::from_utf8_lossy(&text))
             && made_for != machine.name
@@ -152,58 +288,140 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
             "the job names no machine profile: bed and sheet are not checked (see --machine)",
         );
     }
-    if args.port == "sim" {
-        let mut settings = machine
-            .as_ref()
-            .map_or_else(Settings::default, Settings::of_machine);
-        if let Some(s_max) = s_max {
-            settings.s_max = s_max;
-        }
-        let rehearsal =
-            rehearse(&text, &settings, &rules, terminal).map_err(|error| match error {
-                RehearsalError::Job(error) => here(error),
-                RehearsalError::Send(error) => failure(*error),
-            })?;
-        terminal.clear();
-        print(global, &rehearsal.report, Some(&rehearsal.summary));
-        return Ok(());
-    }
-    let job = Job::check(&text, &rules).map_err(here)?;
+    let connection = machine.as_ref().and_then(|m| m.connection.as_ref());
+    let reach = JobReach::of(&String::from_utf8_lossy(&text));
     let options = SendOptions {
         s_max,
-        buffer: machine
-            .as_ref()
-            .and_then(|m| Some(m.connection.as_ref()?.receive_buffer_bytes as usize)),
+        made_for: machine.clone().map(|m| Box::new((m, reach))),
+        buffer: connection.map(|c| c.receive_buffer_bytes as usize),
+        streaming: match connection.and_then(|c| c.streaming) {
+            Some(HandOver::Answered) => Streaming::Answered,
+            Some(HandOver::Counted) | None => Streaming::Counted,
+        },
         ..SendOptions::default()
     };
-    // From the opening on: it resets the board, and an exit in between would leave it to itself.
-    let Some(guard) = terminal.forbid_exit() else {
-        return Err(Failure::Bad(
-            "Ctrl-C cannot be caught here, so a running job could not be stopped with proof; nothing was sent".into(),
-        ));
+    let name = machine.as_ref().map(|m| m.name.as_str());
+    let port = port_of(args.port.as_deref(), name)?;
+    Ok(Ready {
+        port,
+        named: args.port.is_some(),
+        reach,
+        baud: args.baud,
+        text,
+        rules,
+        machine,
+        job,
+        options,
+    })
+}
+
+/// Sends a job.
+pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
+    let what = &args.what;
+    let ready = prepare(what, terminal)?;
+    if ready.port == SIM {
+        return rehearsal(&ready, what, global, terminal);
+    }
+    let cuts = match Cuts::of(&ready.job) {
+        _ if args.no_journal => None,
+        Ok(cuts) if cuts.is_empty() => None,
+        Ok(cuts) => Some(cuts),
+        Err(why) => {
+            terminal.note(&format!(
+                "the head cannot be followed through this job ({why}): it is sent without a journal, and if it is stopped it cannot be resumed"
+            ));
+            None
+        }
     };
-    let baud = args
-        .baud
-        .or(machine.and_then(|m| Some(m.connection?.baud)))
-        .unwrap_or(STANDARD_BAUD);
-    let mut port = SerialTransport::open(&args.port, baud).map_err(Failure::bad)?;
-    let result = send(&mut port, &job, &options, terminal);
-    drop(guard);
-    terminal.clear();
-    let report = result.map_err(failure)?;
+    if !args.yes && !ready.agreed(cuts.as_ref(), terminal) {
+        return Err(Failure::No("nothing was sent".into()));
+    }
+    let report = ready.at_port(terminal, |port| {
+        if args.check {
+            Console::open(port, terminal)
+                .and_then(|mut console| console.dry_run(&ready.job))
+                .map_err(|error| SendError::NotReady {
+                    why: error.to_string(),
+                })?;
+        }
+        let Some(cuts) = &cuts else {
+            return send(port, &ready.job, &ready.options, terminal);
+        };
+        let path = journal::path_for(&what.job);
+        tell_of_old(&path, terminal);
+        let header = ready.header(&what.job, cuts);
+        let mut journal = Journal::new(header, FileStore::new(&path));
+        let sent = send_recorded(
+            port,
+            &ready.job,
+            cuts,
+            &ready.options,
+            terminal,
+            &mut journal,
+        );
+        if let Err(error) = &sent
+            && error.confirmed().is_some()
+        {
+            terminal.note(&format!(
+                "what is cut stands in {}: `kagome resume {}` goes on from there",
+                path.display(),
+                what.job.display()
+            ));
+        }
+        sent
+    })?;
     print(global, &report, None);
     Ok(())
 }
 
+/// The journal of an earlier run is put aside; if that run was not finished, the person should know where.
+fn tell_of_old(path: &Path, terminal: &Terminal) {
+    if let Ok(bytes) = std::fs::read(path)
+        && let Ok(history) = History::read(&bytes)
+        && !history.finished
+    {
+        terminal.note(&format!(
+            "an earlier run of this job was stopped after {} of {} cuts; the job now begins anew, and the old journal is kept as {}",
+            history.proven,
+            history.header.cuts,
+            FileStore::aside(path).display()
+        ));
+    }
+}
+
+/// The job on the machine that is built in.
+fn rehearsal(
+    ready: &Ready,
+    what: &JobArgs,
+    global: &Global,
+    terminal: &Terminal,
+) -> Result<(), Failure> {
+    let mut settings = ready
+        .machine
+        .as_ref()
+        .map_or_else(Settings::default, Settings::of_machine);
+    if let Some(s_max) = ready.options.s_max {
+        settings.s_max = s_max;
+    }
+    let rehearsal =
+        rehearse(&ready.text, &settings, &ready.rules, terminal).map_err(|error| match error {
+            RehearsalError::Job(error) => Failure::Bad(format!("{}: {error}", what.job.display())),
+            RehearsalError::Send(error) => failure(*error),
+        })?;
+    terminal.clear();
+    print(global, &rehearsal.report, Some(&rehearsal.summary));
+    Ok(())
+}
+
 /// A machine that cannot be reached is bad input; one that stopped, or refuses, is an answer.
-fn failure(error: SendError) -> Failure {
+pub(super) fn failure(error: SendError) -> Failure {
     match error {
         SendError::Connect { .. } | SendError::NoController { .. } => Failure::bad(error),
         _ => Failure::No(error.to_string()),
     }
 }
 
-fn print(global: &Global, report: &SendReport, summary: Option<&RehearsalSummary>) {
+pub(super) fn print(global: &Global, report: &SendReport, summary: Option<&RehearsalSummary>) {
     if global.json {
         println!(
             "{}",
@@ -215,6 +433,9 @@ fn print(global: &Global, report: &SendReport, summary: Option<&RehearsalSummary
         "{} lines sent and acknowledged; the machine stands and its beam is off ({})",
         report.acknowledged, report.firmware
     );
+    if report.cuts > 0 {
+        println!("{} cuts, each seen to be made", report.cuts);
+    }
     let minutes = (report.time_s / 60.0).floor();
     println!(
         "time: {minutes:.0} min {:.1} s",

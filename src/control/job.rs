@@ -139,6 +139,7 @@ pub struct Job {
     constant_power: bool,
     largest_s: f64,
     longest_dwell_s: f64,
+    line_limit: usize,
 }
 
 impl Job {
@@ -153,6 +154,7 @@ impl Job {
             constant_power: false,
             largest_s: 0.0,
             longest_dwell_s: 0.0,
+            line_limit: rules.line_limit,
         };
         let mut beam_on = None;
         let mut rows = text.split(|&b| b == b'\n').enumerate().peekable();
@@ -218,6 +220,41 @@ impl Job {
         Ok(job)
     }
 
+    /// The lines from `first` on, after others that set the controller up for them; `before` is put at the beginning of
+    /// one of the lines kept, which is given by its number in this job.
+    ///
+    /// # Errors
+    /// The index of a line that became too long for the controller.
+    pub(super) fn from_line(
+        &self,
+        first: usize,
+        lead: &[String],
+        before: Option<(usize, &str)>,
+    ) -> Result<Self, usize> {
+        let mut job = Self {
+            text: String::new(),
+            lines: Vec::new(),
+            ..self.clone()
+        };
+        let number = self.line(first).map_or(0, |(_, number)| number);
+        for line in lead {
+            job.text.push_str(line);
+            job.lines.push((job.text.len(), number));
+        }
+        for (k, (text, number)) in self.lines().enumerate().skip(first) {
+            let start = job.text.len();
+            if let Some((_, words)) = before.filter(|(line, _)| *line == k) {
+                job.text.push_str(words);
+            }
+            job.text.push_str(text);
+            if job.text.len() - start > self.line_limit {
+                return Err(k);
+            }
+            job.lines.push((job.text.len(), number));
+        }
+        Ok(job)
+    }
+
     /// How many lines will be sent.
     pub fn len(&self) -> usize {
         self.lines.len()
@@ -248,6 +285,15 @@ impl Job {
     /// The largest S word.
     pub fn largest_s(&self) -> f64 {
         self.largest_s
+    }
+
+    /// True if it chooses the first coordinate system (G54); it chooses no other, or could not be followed.
+    pub(super) fn names_first_system(&self) -> bool {
+        // As a word of its own, not as the beginning of G540 or the end of one.
+        self.lines().any(|(text, _)| {
+            text.match_indices("G54")
+                .any(|(at, _)| !text[at + 3..].starts_with(|c: char| c.is_ascii_digit()))
+        })
     }
 
     /// The longest dwell, s: so long may the controller stand idle with lines unanswered.

@@ -9,18 +9,35 @@
 //! What software cannot do: an M3 (constant power) beam stays on after the cable is pulled, until the firmware ends
 //! it. M4 goes dark by itself when motion ends; so M3 is refused unless asked for.
 
+mod awake;
+mod console;
 mod follow;
 mod job;
 pub mod journal;
+mod port;
 mod reply;
 pub mod script;
 mod send;
 mod serial;
+mod stranger;
+mod survey;
+mod tcp;
 mod transport;
 
+pub use awake::Awake;
+pub use console::{
+    Console, ConsoleError, JogTo, Move, Restored, SettingDifference,
+    Settings as ControllerSettings, SettingsError, Told, work_mm,
+};
 pub use follow::{Cut, Cuts, Follower, NotFollowed, Sighting};
 pub use job::{Job, JobError, JobRules};
+pub use port::{OpenPort, usb_name};
 pub use reply::{MachineState, Reply, Status};
-pub use send::{Confirmed, Proof, SendError, SendOptions, SendReport, StopReason, send};
+pub use send::{
+    Confirmed, Proof, Question, SendError, SendOptions, SendReport, StopReason, Streaming, resume,
+    send, send_recorded,
+};
 pub use serial::{PortError, SerialTransport, ports};
+pub use survey::{JobReach, Survey};
+pub use tcp::TcpTransport;
 pub use transport::Transport;

@@ -30,6 +30,10 @@ pub struct Status {
     pub state: MachineState,
     /// The position it tells, mm: machine coordinates, or work coordinates where the controller is set so.
     pub position_mm: Option<[f64; 3]>,
+    /// The position is in work coordinates.
+    pub is_work: bool,
+    /// The work offset, if this report tells it, mm: machine coordinates of the job's zero point.
+    pub offset_mm: Option<[f64; 3]>,
     /// Rate, mm/min.
     pub rate_mm_min: Option<f64>,
     /// Power of the output now, S.
@@ -49,6 +53,15 @@ impl Status {
                 | MachineState::Check
         );
         still && self.s == Some(0.0)
+    }
+
+    /// The same from a controller that reports in inches (`$13=1`), or in units of so many mm.
+    pub(super) fn scaled(mut self, unit_mm: f64) -> Self {
+        let scale = |v: &mut Option<[f64; 3]>| *v = v.map(|v| v.map(|c| c * unit_mm));
+        scale(&mut self.position_mm);
+        scale(&mut self.offset_mm);
+        self.rate_mm_min = self.rate_mm_min.map(|r| r * unit_mm);
+        self
     }
 
     fn parse(text: &str) -> Option<Self> {
@@ -72,6 +85,8 @@ impl Status {
         let mut status = Self {
             state,
             position_mm: None,
+            is_work: false,
+            offset_mm: None,
             rate_mm_min: None,
             s: None,
         };
@@ -79,13 +94,10 @@ impl Status {
             let (name, values) = field.split_once(':')?;
             match name {
                 "MPos" | "WPos" => {
-                    let mut list = values.split(',').map(str::parse::<f64>);
-                    let mut place = [0.0; 3];
-                    for p in &mut place {
-                        *p = list.next()?.ok()?;
-                    }
-                    status.position_mm = Some(place);
+                    status.position_mm = Some(triple(values)?);
+                    status.is_work = name == "WPos";
                 }
+                "WCO" => status.offset_mm = Some(triple(values)?),
                 "FS" => {
                     let (rate, s) = values.split_once(',')?;
                     status.rate_mm_min = Some(rate.parse().ok()?);
@@ -97,6 +109,16 @@ impl Status {
         }
         Some(status)
     }
+}
+
+/// The first three of a list of numbers; machines with more axes tell more.
+pub(super) fn triple(text: &str) -> Option<[f64; 3]> {
+    let mut list = text.split(',').map(str::parse::<f64>);
+    let mut place = [0.0; 3];
+    for p in &mut place {
+        *p = list.next()?.ok().filter(|v| v.is_finite())?;
+    }
+    Some(place)
 }
 
 /// One line from the controller.
@@ -165,6 +187,14 @@ mod tests {
             panic!("{status:?}");
         };
         assert_eq!(status.position_mm, Some([1.0, -2.5, 0.0]));
+        assert_eq!((status.offset_mm, status.is_work), (Some([0.0; 3]), false));
+        let inches = Reply::parse("<Run|WPos:1.0000,0.0000,0.0000,5.0000|FS:10,0>");
+        let Some(Reply::Status(inches)) = inches else {
+            panic!("{inches:?}");
+        };
+        let scaled = inches.scaled(25.4);
+        assert_eq!(scaled.position_mm, Some([25.4, 0.0, 0.0]));
+        assert!(scaled.is_work && scaled.rate_mm_min == Some(254.0));
         assert!(status.dark_and_still());
         assert_eq!(Reply::parse("ok\r"), Some(Reply::Ok));
         assert_eq!(Reply::parse("error:22"), Some(Reply::Error(22)));

@@ -32,6 +32,40 @@ pub enum PortError {
         /// The port.
         port: String,
     },
+    /// Another of our senders has it.
+    #[error("{port} is used by another sender ({by}): wait until it has ended, or end it first")]
+    InUse {
+        /// The port.
+        port: String,
+        /// Which program.
+        by: String,
+    },
+    /// No board with these numbers.
+    #[error(
+        "no board {id} is connected: is it plugged in and switched on? `kagome ports` lists those that are"
+    )]
+    NoBoard {
+        /// `usb:VID:PID`.
+        id: String,
+    },
+    /// Two boards of a kind.
+    #[error("{id} is on {}: name the port itself", .ports.join(" and on "))]
+    Several {
+        /// `usb:VID:PID`.
+        id: String,
+        /// Where they are.
+        ports: Vec<String>,
+    },
+    /// Nobody answers on the network.
+    #[error(
+        "cannot reach {address}: {reason}; is the machine on, in the same network, and its telnet port switched on ($Telnet/Enable on FluidNC)?"
+    )]
+    Network {
+        /// Host and port.
+        address: String,
+        /// The system's reason.
+        reason: String,
+    },
     /// Anything else.
     #[error("cannot open {port} at {baud} baud: {reason}")]
     Other {

@@ -6,7 +6,7 @@ use std::ops::Range;
 use kurbo::Point;
 
 use super::coverage::{Index, Pieces, Segment, distance};
-use super::verify::{Finding, Rule, TOLERANCE_MM, place};
+use super::finding::{Finding, Rule, TOLERANCE_MM, place};
 use super::write::Declared;
 use crate::base::curve::Curve;
 use crate::base::units::short;

@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use kurbo::Point;
 
 use super::coverage::{Index, Segment, distance};
-use super::verify::{Finding, Rule, TOLERANCE_MM, place};
+use super::finding::{Finding, Rule, TOLERANCE_MM, place};
 use crate::base::union::Union;
 use crate::base::units::short;
 use crate::pattern::{Sheet, Star};

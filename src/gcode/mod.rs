@@ -6,6 +6,7 @@
 
 mod compare;
 mod coverage;
+mod finding;
 mod interpret;
 mod ligament;
 mod outside;
@@ -17,7 +18,8 @@ mod verify;
 mod write;
 
 pub use compare::Slack;
+pub use finding::{Finding, Rule, TOLERANCE_MM};
 pub use interpret::{Beam, Dialect, Move, Program, read, read_as, read_with};
 pub use ligament::Ligaments;
-pub use verify::{Finding, Rule, TOLERANCE_MM, Verdict, compare_burnt, verify};
+pub use verify::{Verdict, compare_burnt, verify};
 pub use write::{Declared, GcodeError, machine_of, passes_of, write};

@@ -6,7 +6,7 @@ use kurbo::Point;
 
 use super::compare::Wanted;
 use super::coverage::{Index, Segment, distance};
-use super::verify::TOLERANCE_MM;
+use super::finding::TOLERANCE_MM;
 use crate::base::plane;
 use crate::pattern::Sheet;
 

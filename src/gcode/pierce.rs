@@ -3,8 +3,8 @@
 use kurbo::{Point, Vec2};
 
 use super::coverage::{Index, Segment, distance};
+use super::finding::{Finding, Rule, TOLERANCE_MM, place};
 use super::outside::Outside;
-use super::verify::{Finding, Rule, TOLERANCE_MM, place};
 use crate::base::units::short;
 use crate::pattern::Sheet;
 

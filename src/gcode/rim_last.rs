@@ -2,7 +2,7 @@
 
 use super::compare::{Kind, Wanted};
 use super::coverage::Segment;
-use super::verify::{Finding, Rule, place};
+use super::finding::{Finding, Rule, place};
 use crate::base::plane;
 use crate::pattern::Sheet;
 

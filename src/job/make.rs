@@ -140,6 +140,8 @@ pub struct Made {
     pub verdict: Verdict,
     /// Figures of the linkage on each surface, in their order.
     pub qualities: Vec<Quality>,
+    /// Stretch λ of every hinge that is cut, on each surface.
+    pub openings: Vec<Vec<f64>>,
     /// What was noticed and does not forbid the cut.
     pub warnings: Vec<String>,
     /// The result in a few lines, for a person.
@@ -370,10 +372,23 @@ pub fn make(request: &Request, folder: &Path, progress: &dyn Progress) -> Result
         files.push((names[1], layout(&target.surface)));
     }
     let qualities = shape.fits.into_iter().map(|fit| fit.quality).collect();
+    let kept: Vec<bool> = shape
+        .linkage
+        .hinges
+        .iter()
+        .map(|hinge| shape.linkage.keeps(hinge))
+        .collect();
+    let openings = measured.into_iter().map(|(_, openings)| {
+        let cut = openings.into_iter().zip(&kept);
+        cut.filter_map(|(opening, kept)| kept.then_some(opening))
+            .collect()
+    });
+    let openings = openings.collect();
     Ok(Made {
         design,
         verdict: shape.verdict,
         qualities,
+        openings,
         warnings,
         summary,
         streamed: machine.controller.is_streamed(),

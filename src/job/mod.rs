@@ -29,7 +29,7 @@ mod verdict;
 
 use std::path::PathBuf;
 
-pub use coupon::{COUPON_FILES, CouponFiles, make_coupon};
+pub use coupon::{COUPON_FILES, CouponFiles, FitPlot, make_coupon, with_fit};
 pub use cut::{CutDrawing, cut_drawing};
 pub use design::{
     AlsoChoice, ConeChoice, CutChoice, DartChoice, Design, LinkageChoice, SheetChoice, SolveChoice,

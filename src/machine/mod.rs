@@ -13,7 +13,9 @@ mod start;
 mod tool;
 
 pub use controller::{Controller, ControllerLimits};
-pub use profile::{Axes, Bed, Connection, Homing, Job, Machine, Motion, Origin, Place, Reach};
+pub use profile::{
+    Axes, Bed, Connection, HandOver, Homing, Job, Machine, Motion, Origin, Place, Reach,
+};
 pub use shipped::{DEFAULT, load, own_file, own_files, parse, resolve, shipped};
 pub use start::{ControllerSettings, start};
 pub use tool::{

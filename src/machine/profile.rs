@@ -70,6 +70,29 @@ pub struct Connection {
     pub planner_blocks: u32,
     /// Whether opening the port resets the controller.
     pub reset_on_open: bool,
+    /// Cuts that may be sent without being proven by the head's position: so many at most are cut twice after whatever
+    /// happened. 3 unless given. Measured: from 2 on it costs no time; 1 costs 3 % on a sheet of 1500 slits of 3 mm to
+    /// 6 mm at 25 mm/s, and up to 11 % at 100 mm/s, because the head stands at each slit until the last one is proven.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_unconfirmed_cuts: Option<u32>,
+    /// How lines are handed over; `counted` unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub streaming: Option<HandOver>,
+}
+
+/// How lines are handed to a controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum HandOver {
+    /// As many as its buffer holds.
+    Counted,
+    /// Each after the answer to the one before: for firmware that loses count, at half the rate or less.
+    Answered,
+}
+
+impl Connection {
+    /// [`Connection::max_unconfirmed_cuts`] where the profile does not say.
+    pub const UNCONFIRMED_CUTS: u32 = 3;
 }
 
 /// Homing: `[homing]`.
@@ -331,7 +354,16 @@ impl Machine {
             f64::from(c.planner_blocks),
             1.0,
             100_000.0,
-        )
+        )?;
+        match c.max_unconfirmed_cuts {
+            Some(cuts) => ranged(
+                "connection.max_unconfirmed_cuts",
+                f64::from(cuts),
+                1.0,
+                1000.0,
+            ),
+            None => Ok(()),
+        }
     }
 
     fn check_park(&self) -> Result<(), Complaint> {

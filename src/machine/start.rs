@@ -114,6 +114,12 @@ fn explain(table: &str, key: &str) -> Option<&'static str> {
         }
         ("connection", "planner_blocks") => "moves that it plans ahead; the first number there",
         ("connection", "reset_on_open") => "whether opening the port resets the board",
+        ("connection", "max_unconfirmed_cuts") => {
+            "cuts that may be sent beyond the last one proven, and cut twice after a fault; 3 unless given"
+        }
+        ("connection", "streaming") => {
+            "counted (as much as the buffer holds), or answered (line by line, for odd firmware)"
+        }
         ("homing", "enabled") => "whether it has switches and $H works; $22",
         ("job", "park") => "where the head goes at the end",
         ("job", "preamble") => "lines after units and modes, before the first motion",

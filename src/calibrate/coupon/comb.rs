@@ -211,3 +211,64 @@ pub(super) fn ticks(step: f64) -> Vec<(f64, usize)> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::units::fixed;
+
+    #[test]
+    fn on_the_card_the_stretch_stands_where_the_other_mark_comes_to_lie() {
+        let strips = [7.0, 10.5, 12.0].map(|edge| Strip {
+            name: format!("S{edge}"),
+            ..Strip::new(1.0, edge)
+        });
+        let card = card(&strips, 0.025, &SheetOptions::plain(1.0, 0.2));
+        let scales: Vec<&Mark> = card
+            .marks
+            .iter()
+            .filter(|m| m.kind == MarkKind::Gauge)
+            .collect();
+        let lengths = gauges(&strips);
+        assert_eq!(scales.len(), lengths.len());
+        for strip in &strips {
+            // The scale with the strip's name below its zero.
+            let index = lengths
+                .iter()
+                .position(|l| (l - strip.gauge_mm).abs() < 1e-6)
+                .unwrap();
+            let places: Vec<Point> = scales[index]
+                .lines
+                .iter()
+                .map(|l| l.vertices[0].at)
+                .collect();
+            let (zero, ticks) = places.split_first().unwrap();
+            assert_eq!(ticks.len(), 41);
+            for (n, tick) in ticks.iter().enumerate() {
+                let stretch = 1.0 + 0.025 * n as f64;
+                assert!((tick.x - zero.x - stretch * strip.gauge_mm).abs() < 1e-9);
+                assert!((tick.y - zero.y).abs() < 1e-9);
+            }
+            let named = |text: &str| -> Vec<Point> {
+                let labels = card.marks.iter().filter_map(|m| m.label.as_ref());
+                labels.filter(|l| l.text == text).map(|l| l.at).collect()
+            };
+            for tenth in 10..=20 {
+                let stretch = 0.1 * f64::from(tenth);
+                let x = zero.x + stretch * strip.gauge_mm;
+                let at = named(&fixed(stretch, 1));
+                assert!(at.iter().any(|p| (p.x - x).abs() < 1e-9 && p.y < zero.y));
+            }
+            let name = named(&strip.name)[0];
+            assert!(name.y < zero.y && zero.y - name.y < SCALE_MM);
+        }
+        assert!(
+            card.bounds().x1
+                > scales
+                    .iter()
+                    .flat_map(|m| &m.lines)
+                    .map(|l| l.vertices[0].at.x)
+                    .fold(0.0, f64::max)
+        );
+    }
+}

@@ -230,7 +230,13 @@ fn linkage(edge_mm: f64, columns: i32) -> Linkage {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Point3, Vector3};
+
     use super::*;
+    use crate::base::ids::Id as _;
+    use crate::base::progress::Silent;
+    use crate::linkage::TriangleId;
+    use crate::rationalize::opening_path;
 
     #[test]
     fn a_strip_has_the_counted_hinges_and_no_triangle_hangs_by_one() {
@@ -279,6 +285,34 @@ mod tests {
                 // No vertex of the strip's end comes within an edge's length of a pad.
                 let low = sheet.contours[0].line.bounds().unwrap().x0 + PAD_MM[0];
                 assert!(bare.bounds().x0 - low > 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn the_gauge_reads_the_stretch_of_a_strip_that_the_solver_opened() {
+        for edge in [7.0, 10.5, 23.5] {
+            let strip = Strip::new(0.1 * edge, edge);
+            let linkage = strip.linkage();
+            let mut closed = vec![Point3::origin(); linkage.point_count()];
+            for triangle in linkage.triangles.iter() {
+                for (point, flat) in triangle.points.iter().zip(&triangle.flat) {
+                    closed[point.index()] = Point3::new(flat.x, flat.y, 0.0);
+                }
+            }
+            let path = opening_path(&linkage, &closed, [1.0, 1.9], 9, 2.0, &Silent).unwrap();
+            assert_eq!(path.states.len(), 10);
+            for state in &path.states {
+                assert!(state.sound());
+                let [a, b] = strip.gauge_triangles().map(|t| {
+                    let corners = linkage.triangles[TriangleId::from_index(t)].points;
+                    corners.iter().fold(Vector3::zeros(), |sum, p| {
+                        sum + state.positions[p.index()].coords / 3.0
+                    })
+                });
+                let read = (b - a).norm() / strip.gauge_mm;
+                let off = read / state.mean() - 1.0;
+                assert!(off.abs() < 0.01, "{edge} mm, {}: {off}", state.mean());
             }
         }
     }

@@ -22,10 +22,10 @@ The folder holds settings.nc, kerf.nc and strips.nc, to be cut in this order on 
 pub(super) struct CouponArgs {
     /// Machine profile, by name (see `kagome machines list`) or file
     #[arg(long, value_name = "NAME|FILE", default_value = crate::machine::DEFAULT)]
-    machine: String,
+    pub(super) machine: String,
     /// Material profile, by name (see `kagome materials list`) or file
     #[arg(long, value_name = "NAME|FILE", default_value = crate::material::DEFAULT)]
-    material: String,
+    pub(super) material: String,
     /// Size of the piece in the bed's corner, millimetres [default: the material's, else the bed]
     #[arg(long, value_name = "WxH", value_parser = size)]
     stock: Option<[f64; 2]>,
@@ -37,10 +37,20 @@ pub(super) struct CouponArgs {
     edge: Vec<f64>,
     /// The folder to write [default: MATERIAL-coupon]
     #[arg(short, long, value_name = "FOLDER")]
-    output: Option<PathBuf>,
+    pub(super) output: Option<PathBuf>,
     /// Replace a coupon that is there already
     #[arg(long)]
-    force: bool,
+    pub(super) force: bool,
+}
+
+impl CouponArgs {
+    pub(super) fn wish(&self) -> CouponWish {
+        CouponWish {
+            hinge_widths_mm: self.hinge_width.clone(),
+            edges_mm: self.edge.clone(),
+            stock_mm: self.stock,
+        }
+    }
 }
 
 /// Runs the verb.
@@ -66,12 +76,7 @@ pub(super) fn run(args: &CouponArgs, global: &Global, terminal: &Terminal) -> Re
             folder.display()
         )));
     }
-    let wish = CouponWish {
-        hinge_widths_mm: args.hinge_width.clone(),
-        edges_mm: args.edge.clone(),
-        stock_mm: args.stock,
-    };
-    let made = make_coupon(&wish, &machine, &material, terminal)
+    let made = make_coupon(&args.wish(), &machine, &material, terminal)
         .map_err(|e: MakeError| Failure::bad(e))?;
     terminal.clear();
     if !made.objections.is_empty() {

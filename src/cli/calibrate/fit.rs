@@ -1,6 +1,6 @@
 //! `kagome calibrate fit`: from readings to σ, kerf and setting in a profile.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
@@ -8,13 +8,16 @@ use serde_json::json;
 use super::outcome::{Machined, Reference, Strips, machined, middle, strips};
 use super::record::text_of;
 use super::upgrade::{Base, base, measured};
+use crate::base::atomic::write_file;
 use crate::base::progress::Progress as _;
 use crate::base::units::short;
 use crate::calibrate::{CONFIDENCES, Geometry, Readings, not_counted_yet};
-use crate::cli::profiles::machine_named;
+use crate::cli::profiles::{machine_named, own_folder};
 use crate::cli::{Failure, Global, Terminal, print, print_json};
+use crate::job::{FitPlot, with_fit};
 use crate::machine;
 use crate::material::Reading;
+use crate::pattern::Tip;
 
 /// Arguments of `kagome calibrate fit`.
 #[derive(Args, Clone, Debug)]
@@ -52,7 +55,94 @@ pub(super) struct FitArgs {
     dry_run: bool,
 }
 
+impl FitArgs {
+    /// A fit of these readings into a profile of this name, with everything else left to the program.
+    pub(super) fn of(readings: PathBuf, material: &str, name: String, confidence: f64) -> Self {
+        Self {
+            readings: vec![readings],
+            material: Some(material.to_owned()),
+            confidence,
+            hinge_width: None,
+            edge: None,
+            hinges: 1000,
+            name: Some(name),
+            take_setting: false,
+            dry_run: false,
+        }
+    }
+}
+
+/// What a fit found and did.
+pub(super) struct Outcome {
+    pub base: Base,
+    pub found: Option<Strips>,
+    pub machines: Vec<Machined>,
+    fresh: usize,
+    known: Vec<String>,
+    notes: Vec<String>,
+    /// The profile, if it was written.
+    pub written: Option<PathBuf>,
+    unchanged: bool,
+}
+
+impl Outcome {
+    /// Why there is no σ.
+    pub fn refused(&self) -> Option<&str> {
+        self.found.as_ref()?.refused.as_deref()
+    }
+}
+
 pub(super) fn run(args: &FitArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
+    let outcome = carry_out(args, own_folder().as_deref(), terminal)?;
+    if global.json {
+        print_json(&json!({
+            "material": outcome.base.material.name,
+            "confidence": args.confidence,
+            "strips": outcome.found,
+            "fresh": outcome.fresh,
+            "counted_already": outcome.known,
+            "machines": outcome.machines,
+            "notes": outcome.notes,
+            "profile": outcome.base.name,
+            "written": outcome.written,
+        }))?;
+    } else {
+        let mut lines = lines(
+            &outcome.base.material.name,
+            outcome.found.as_ref(),
+            &outcome.machines,
+            args.confidence,
+        );
+        lines.extend(outcome.notes.iter().cloned());
+        let name = &outcome.base.name;
+        lines.push(match (&outcome.written, outcome.unchanged) {
+            (Some(file), _) => {
+                format!("Written to {}; --material {name} finds it", file.display())
+            }
+            (None, true) => format!("{name} has all of this already"),
+            (None, false) if outcome.refused().is_some() => String::new(),
+            (None, false) => format!("nothing is written; it would be {name}"),
+        });
+        lines.retain(|l| !l.is_empty());
+        if !lines.is_empty() {
+            print(&lines.join("\n"))?;
+        }
+    }
+    match outcome.refused() {
+        None => Ok(()),
+        Some(why) => Err(Failure::No(format!("there is no σ: {why}"))),
+    }
+}
+
+/// Fits, and writes the profile into the folder `own` of a person's profiles. Guides beside the readings get the picture.
+///
+/// # Errors
+/// [`Failure`]: readings or profiles that cannot be used; readings from which nothing can be fitted.
+pub(super) fn carry_out(
+    args: &FitArgs,
+    own: Option<&Path>,
+    terminal: &Terminal,
+) -> Result<Outcome, Failure> {
     if !CONFIDENCES.contains(&args.confidence) {
         return Err(Failure::Bad(format!(
             "a confidence of {} is not between {} and {}",
@@ -62,7 +152,7 @@ pub(super) fn run(args: &FitArgs, global: &Global, terminal: &Terminal) -> Resul
         )));
     }
     let all = read(args)?;
-    let base = base(&material(args, &all)?, args.name.as_deref())?;
+    let base = base(&material(args, &all)?, args.name.as_deref(), own)?;
     let new: Vec<Reading> = all.iter().flat_map(|r| r.strips.clone()).collect();
     let (fresh, known) = not_counted_yet(&base.material.sigma.sample, &new);
     if !known.is_empty() {
@@ -104,54 +194,64 @@ pub(super) fn run(args: &FitArgs, global: &Global, terminal: &Terminal) -> Resul
         &date,
         args.take_setting,
     );
-    let refused = found.as_ref().and_then(|f| f.refused.clone());
-    let mut written = None;
-    let mut unchanged = false;
-    if refused.is_none() {
-        match base.amended(&changes)? {
-            None => unchanged = true,
+    let mut outcome = Outcome {
+        base,
+        found,
+        machines,
+        fresh: fresh.len(),
+        known,
+        notes,
+        written: None,
+        unchanged: false,
+    };
+    if outcome.refused().is_none() {
+        match outcome.base.amended(&changes)? {
+            None => outcome.unchanged = true,
             Some(_) if args.dry_run => {}
-            Some(text) => written = Some(base.write(&text)?),
+            Some(text) => outcome.written = Some(outcome.base.write(&text)?.to_path_buf()),
         }
     }
-    if global.json {
-        print_json(&json!({
-            "material": base.material.name,
-            "confidence": args.confidence,
-            "strips": found,
-            "fresh": fresh.len(),
-            "counted_already": known,
-            "machines": machines,
-            "notes": notes,
-            "profile": base.name,
-            "written": written,
-        }))?;
+    if let Some(found) = outcome.found.as_ref().filter(|_| !args.dry_run) {
+        draw(args, found, &pulled, terminal);
+    }
+    Ok(outcome)
+}
+
+/// Puts the picture into the guides beside the readings. What was fitted stands without it.
+fn draw(args: &FitArgs, found: &Strips, pulled: &[Reading], terminal: &Terminal) {
+    let plot = FitPlot {
+        readings: pulled,
+        calibration: &found.calibration,
+        sheet: (found.reference.geometry, found.reference.hinges),
+        bound: found.bound.as_ref(),
+        confidence: args.confidence,
+    };
+    for path in &args.readings {
+        let guide = file_of(path).with_file_name("guide.html");
+        let Ok(text) = std::fs::read_to_string(&guide) else {
+            continue;
+        };
+        let Some(with) = with_fit(&text, &plot) else {
+            continue;
+        };
+        match write_file(&guide, with.as_bytes()) {
+            Ok(()) => terminal.note(&format!(
+                "{}: readings, fit and bound are drawn at its end",
+                guide.display()
+            )),
+            Err(error) => terminal.note(&format!(
+                "the guide stays without the picture of the fit: {error}"
+            )),
+        }
+    }
+}
+
+/// readings.toml of a folder.
+fn file_of(path: &Path) -> PathBuf {
+    if path.is_dir() {
+        path.join("readings.toml")
     } else {
-        let mut lines = lines(
-            &base.material.name,
-            found.as_ref(),
-            &machines,
-            args.confidence,
-        );
-        lines.extend(notes);
-        lines.push(match (&written, unchanged) {
-            (Some(file), _) => format!(
-                "Written to {}; --material {} finds it",
-                file.display(),
-                base.name
-            ),
-            (None, true) => format!("{} has all of this already", base.name),
-            (None, false) if refused.is_some() => String::new(),
-            (None, false) => format!("nothing is written; it would be {}", base.name),
-        });
-        lines.retain(|l| !l.is_empty());
-        if !lines.is_empty() {
-            print(&lines.join("\n"))?;
-        }
-    }
-    match refused {
-        None => Ok(()),
-        Some(why) => Err(Failure::No(format!("there is no σ: {why}"))),
+        path.to_path_buf()
     }
 }
 
@@ -199,11 +299,7 @@ fn lines(
 
 fn read(args: &FitArgs) -> Result<Vec<Readings>, Failure> {
     let one = |path: &PathBuf| {
-        let file = if path.is_dir() {
-            path.join("readings.toml")
-        } else {
-            path.clone()
-        };
+        let file = file_of(path);
         Readings::parse(&file.display().to_string(), &text_of(&file)?).map_err(Failure::bad)
     };
     args.readings.iter().map(one).collect()
@@ -244,7 +340,7 @@ fn reference(
         .or_else(set)
         .or_else(|| middle(pulled.iter().map(|r| r.kerf_mm)))
         .unwrap_or(0.2);
-    let radius = material.tip.and_then(|t| t.radius_mm);
+    let tip = material.tip.map_or(Tip::Plain, Tip::from);
     let edge_mm = args
         .edge
         .or_else(|| middle(pulled.iter().map(|r| r.edge_mm)))
@@ -252,7 +348,7 @@ fn reference(
     let geometry = Geometry {
         hinge_width_mm: args.hinge_width.unwrap_or(material.hinge_width_mm),
         kerf_mm,
-        tip_radius_mm: radius.unwrap_or(0.5 * kerf_mm),
+        tip_radius_mm: tip.radius_mm(kerf_mm),
         thickness_mm: material.thickness_mm,
         edge_mm,
     };

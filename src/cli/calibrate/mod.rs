@@ -5,6 +5,7 @@ mod dialogue;
 mod fit;
 mod outcome;
 mod record;
+mod rehearse;
 mod upgrade;
 
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -34,6 +35,8 @@ enum What {
     Record(record::RecordArgs),
     /// From readings to σ with a stated confidence, kerf and setting, in a profile of your own
     Fit(fit::FitArgs),
+    /// The whole evening without a machine: a coupon cut, pulled, recorded and fitted in simulation, and a sheet made of it
+    Rehearse(Box<rehearse::RehearseArgs>),
 }
 
 /// Runs the verb.
@@ -45,6 +48,7 @@ pub fn run(args: &CalibrateArgs, global: &Global, terminal: &Terminal) -> Result
         What::Coupon(args) => coupon::run(args, global, terminal),
         What::Record(args) => record::run(args, global, terminal),
         What::Fit(args) => fit::run(args, global, terminal),
+        What::Rehearse(args) => rehearse::run(args, global, terminal),
     }
 }
 

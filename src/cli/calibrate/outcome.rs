@@ -44,6 +44,9 @@ pub(super) struct Strips {
     /// Why there is none.
     pub refused: Option<String>,
     pub next: Option<Next>,
+    /// The fit itself.
+    #[serde(skip)]
+    pub calibration: Calibration,
 }
 
 /// The strip to pull next.
@@ -101,6 +104,7 @@ pub(super) fn strips(
         bound,
         refused,
         next,
+        calibration,
     })
 }
 

@@ -7,7 +7,7 @@ use crate::base::atomic::write_file;
 use crate::base::units::{floored, rounded, short};
 use crate::calibrate::KERF_DECIMALS;
 use crate::cli::Failure;
-use crate::cli::profiles::{machine_named, material_named, own_folder};
+use crate::cli::profiles::{machine_named, material_named};
 use crate::machine;
 use crate::material::{self, Material, Measured, MeasuredCut, Reading, amend};
 
@@ -25,19 +25,18 @@ pub(super) struct Base {
     renamed: Option<[String; 2]>,
 }
 
-/// Finds the profile: one's own of this name, else one called NAME-measured, made from it.
+/// Finds the profile in the folder `own`: one's own of this name, else one called NAME-measured, made from it.
 ///
 /// # Errors
 /// [`Failure::Bad`]: nobody knows the material, or the new name cannot be one.
-pub(super) fn base(asked: &str, new: Option<&str>) -> Result<Base, Failure> {
+pub(super) fn base(asked: &str, new: Option<&str>, own: Option<&Path>) -> Result<Base, Failure> {
     let found = material_named(asked).map_err(|e| {
         Failure::Bad(format!(
             "{e}\nName the material that the coupon was cut from with --material"
         ))
     })?;
     let source = material::load(&found).map_err(Failure::bad)?;
-    let own = own_folder();
-    let file_of = |name: &str| own.as_deref().and_then(|own| material::own_file(own, name));
+    let file_of = |name: &str| own.and_then(|own| material::own_file(own, name));
     let is_own = file_of(&source.name).is_some_and(|file| same_file(&file, Path::new(&found)));
     let name = match new {
         Some(new) => new.to_owned(),

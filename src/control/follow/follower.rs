@@ -150,23 +150,19 @@ impl<'a> Follower<'a> {
 
 /// The first part of a piece, not before `least`, that lies within the tolerance of a point; else the distance to it.
 fn entry(piece: &Piece, point: [f64; 2], least: f64, tolerance_mm: f64) -> Result<f64, f64> {
-    let d = [piece.to[0] - piece.from[0], piece.to[1] - piece.from[1]];
-    let length_sqr = d[0] * d[0] + d[1] * d[1];
-    let on = |t: f64| [piece.from[0] + d[0] * t, piece.from[1] + d[1] * t];
-    if distance(on(least), point) <= tolerance_mm {
+    if distance(piece.at(least), point) <= tolerance_mm {
         return Ok(least);
     }
-    if length_sqr == 0.0 {
+    let Some(foot) = piece.foot(point) else {
         return Err(distance(piece.from, point));
-    }
-    let foot = ((point[0] - piece.from[0]) * d[0] + (point[1] - piece.from[1]) * d[1]) / length_sqr;
+    };
     let nearest = foot.clamp(least.min(1.0), 1.0);
-    let away = distance(on(nearest), point);
+    let away = distance(piece.at(nearest), point);
     if away > tolerance_mm {
         return Err(away);
     }
     // Back from the foot by half a chord of the circle round the point.
-    let off = distance(on(foot), point);
-    let half = (tolerance_mm * tolerance_mm - off * off).max(0.0).sqrt() / length_sqr.sqrt();
+    let off = distance(piece.at(foot), point);
+    let half = (tolerance_mm * tolerance_mm - off * off).max(0.0).sqrt() / piece.length_mm();
     Ok((foot - half).clamp(least.min(1.0), 1.0))
 }

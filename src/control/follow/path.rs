@@ -24,6 +24,20 @@ impl Piece {
     pub fn length_mm(&self) -> f64 {
         distance(self.from, self.to)
     }
+
+    /// The point of it at this part, 0 to 1.
+    pub fn at(&self, part: f64) -> [f64; 2] {
+        std::array::from_fn(|k| self.from[k] + (self.to[k] - self.from[k]) * part)
+    }
+
+    /// The part at which the foot of the perpendicular from a point lies, on the piece or beyond it; none for a piece
+    /// without length.
+    pub fn foot(&self, point: [f64; 2]) -> Option<f64> {
+        let d = [self.to[0] - self.from[0], self.to[1] - self.from[1]];
+        let length_sqr = d[0] * d[0] + d[1] * d[1];
+        let along = (point[0] - self.from[0]) * d[0] + (point[1] - self.from[1]) * d[1];
+        (length_sqr > 0.0).then(|| along / length_sqr)
+    }
 }
 
 /// Between two points, mm.

@@ -1,17 +1,57 @@
 //! The banner, and what the controller must be and how it must be set before a job.
 
+use std::collections::BTreeMap;
 use std::io;
 use std::time::Duration;
 
 use super::reason::error_words;
 use super::{ANSWER, RESET, SendError, Sender};
-use crate::control::reply::{MachineState, Reply};
+use crate::control::reply::{MachineState, Reply, Status, triple};
+use crate::control::stranger;
+use crate::control::survey::Survey;
+use crate::machine;
 
 /// The largest receive buffer believed, bytes: what grblHAL and FluidNC boards tell at the most.
 const LARGEST_BUFFER: usize = 1024;
 
+/// What was heard before anything was.
+pub(super) const NOTHING: &str = "nothing was heard";
+
+/// What the controller is, found out before the job.
+pub(super) struct Facts {
+    /// Its receive buffer, bytes.
+    pub buffer: usize,
+    /// What it calls itself.
+    pub firmware: String,
+    /// What it reports lengths in, mm.
+    pub unit_mm: f64,
+    /// It homes.
+    pub homes: bool,
+    /// The coordinate system that the job runs in.
+    pub system: String,
+    /// How far a report may be from the job's way.
+    pub tolerance_mm: f64,
+    /// Machine coordinates of the job's zero point, mm; 0 if the job cuts nothing.
+    pub offset_mm: [f64; 3],
+    /// The report of where it stands, if the job cuts anything.
+    pub position_mm: Option<Status>,
+}
+
+/// How far a report may be from where the job says the head is: half of the last decimal in each axis, an end rounded to
+/// steps and the head a step off the straight line, and the chords of arcs, the controller's and ours.
+fn tolerance_mm(setting: &dyn Fn(u32) -> Option<f64>) -> f64 {
+    // Boards that do not tell their steps are taken for coarse ones.
+    const COARSE: f64 = 20.0;
+    const DECIMALS_MM: f64 = 0.0013;
+    const CHORDS_MM: f64 = 0.004;
+    const SLACK_MM: f64 = 0.01;
+    let step = |number| 1.0 / setting(number).filter(|v| *v > 0.0).unwrap_or(COARSE);
+    let arc = setting(12).unwrap_or(0.002).clamp(0.0, 1.0);
+    1.5 * step(100).hypot(step(101)) + arc + DECIMALS_MM + CHORDS_MM + SLACK_MM
+}
+
 impl Sender<'_> {
-    fn connect_error(&self, source: io::Error) -> SendError {
+    pub(super) fn connect_error(&self, source: io::Error) -> SendError {
         SendError::Connect {
             port: self.port(),
             source,
@@ -19,47 +59,61 @@ impl Sender<'_> {
     }
 
     /// Waits for the banner, resets the controller if there is none, and gives the banner.
-    pub(super) fn connect(&mut self) -> Result<String, SendError> {
-        let mut heard = "nothing was heard".to_owned();
-        for reset in [false, true] {
-            if reset {
-                self.link
-                    .send(RESET)
-                    .map_err(|source| self.connect_error(source))?;
-            }
-            let wait = if reset {
-                ANSWER
-            } else {
-                self.options.banner_wait
-            };
-            let deadline = self.now() + wait;
-            while let Some(reply) = self
-                .link
-                .reply_before(deadline)
-                .map_err(|source| self.connect_error(source))?
-            {
-                self.check_interrupted()?;
-                match reply {
-                    Reply::Banner(text) => {
-                        // What follows at once (the lock's message) belongs to the banner.
-                        let settle = self.now() + Duration::from_millis(100);
-                        while self
-                            .link
-                            .reply_before(settle)
-                            .map_err(|source| self.connect_error(source))?
-                            .is_some()
-                        {}
-                        return Ok(text);
-                    }
-                    Reply::Unknown(text) => heard = format!("it says {text:?}"),
-                    _ => {}
+    fn connect(&mut self) -> Result<String, SendError> {
+        let mut heard = NOTHING.to_owned();
+        if let Some(banner) = self.await_banner(self.options.banner_wait, &mut heard)? {
+            return Ok(banner);
+        }
+        self.reset_and_connect(heard)
+    }
+
+    /// Resets the controller and gives its banner. `heard`: what was heard so far in place of one.
+    pub(super) fn reset_and_connect(&mut self, mut heard: String) -> Result<String, SendError> {
+        self.link
+            .send(RESET)
+            .map_err(|source| self.connect_error(source))?;
+        self.await_banner(ANSWER, &mut heard)?
+            .ok_or(SendError::NoController {
+                port: self.port(),
+                heard,
+            })
+    }
+
+    /// The banner, if it comes in this time.
+    fn await_banner(
+        &mut self,
+        wait: Duration,
+        heard: &mut String,
+    ) -> Result<Option<String>, SendError> {
+        let deadline = self.now() + wait;
+        while let Some(reply) = self
+            .link
+            .reply_before(deadline)
+            .map_err(|source| self.connect_error(source))?
+        {
+            self.check_interrupted()?;
+            match reply {
+                Reply::Banner(text) => {
+                    self.hear_out()?;
+                    return Ok(Some(text));
                 }
+                Reply::Unknown(text) => *heard = stranger::words(&text),
+                _ => {}
             }
         }
-        Err(SendError::NoController {
-            port: self.port(),
-            heard,
-        })
+        Ok(None)
+    }
+
+    /// What follows the banner at once (the lock's message) belongs to it.
+    pub(super) fn hear_out(&mut self) -> Result<(), SendError> {
+        let settle = self.now() + Duration::from_millis(100);
+        while self
+            .link
+            .reply_before(settle)
+            .map_err(|source| self.connect_error(source))?
+            .is_some()
+        {}
+        Ok(())
     }
 
     /// The person may change their mind before anything is sent.
@@ -73,7 +127,7 @@ impl Sender<'_> {
     }
 
     /// Sends a question and collects what is said until `ok`.
-    fn ask(&mut self, question: &str) -> Result<Vec<Reply>, SendError> {
+    pub(super) fn ask(&mut self, question: &str) -> Result<Vec<Reply>, SendError> {
         let lost = |port: String, source| SendError::Connect { port, source };
         let text = format!("{question}\n");
         self.link
@@ -108,62 +162,46 @@ impl Sender<'_> {
         }
     }
 
-    /// Is this the controller, set as the job needs it? Gives the size of its receive buffer.
-    pub(super) fn preflight(&mut self) -> Result<usize, SendError> {
-        let not_ready = |why: String| Err(SendError::NotReady { why });
-        let state = self.ask_status()?;
-        match state {
-            MachineState::Idle => {}
+    /// Banner, then pre-flight.
+    pub(super) fn connect_and_check(&mut self) -> Result<Facts, SendError> {
+        let firmware = self.connect()?;
+        self.check_idle()?;
+        self.preflight(firmware)
+    }
+
+    /// The machine must be ready.
+    pub(super) fn check_idle(&mut self) -> Result<(), SendError> {
+        let why = match self.ask_status()?.state {
+            MachineState::Idle => return Ok(()),
             MachineState::Alarm => {
-                return not_ready(
-                    "the machine is locked: home it ($H), or unlock it ($X) if you know where it stands"
-                        .into(),
-                );
+                "the machine is locked: home it ($H), or unlock it ($X) if you know where it stands"
+                    .into()
             }
             other => {
-                return not_ready(format!(
-                    "the machine is not idle ({other:?}): bring it to rest first"
-                ));
+                format!("the machine is not idle ({other:?}): bring it to rest first")
             }
-        }
-        let mut buffer = None;
-        for reply in self.ask("$I")? {
-            if let Reply::Message(text) = reply
-                && let Some(options) = text.strip_prefix("[OPT:")
-            {
-                let mut fields = options.trim_end_matches(']').split(',');
-                buffer = fields.nth(2).and_then(|f| f.parse::<usize>().ok());
-            }
-        }
-        // FluidNC does not tell: then the profile must.
-        let told = buffer.filter(|&b| b >= 82).or(self.options.buffer);
-        let Some(told) = told.filter(|&b| b >= 82) else {
-            return not_ready(
-                "the controller does not tell the size of its receive buffer ($I), and neither does the machine's profile (receive_buffer_bytes): it is not known how much can be sent at once"
-                    .into(),
-            );
         };
-        // One byte less than told: grblHAL tells the size of a ring that holds one less. And never more than the
-        // profile says, nor more than any of these boards has: a damaged number must not overrun the real buffer.
-        let buffer = told
-            .min(self.options.buffer.unwrap_or(LARGEST_BUFFER))
-            .min(LARGEST_BUFFER)
-            - 1;
-        let (mut laser, mut s_max) = (None, None);
+        Err(SendError::NotReady { why })
+    }
+
+    /// Is this the controller, set as the job needs it?
+    pub(super) fn preflight(&mut self, firmware: String) -> Result<Facts, SendError> {
+        let not_ready = |why: String| Err(SendError::NotReady { why });
+        let (buffer, letters) = self.ask_buffer()?;
+        let mut settings = BTreeMap::new();
         for reply in self.ask("$$")? {
-            match reply {
-                Reply::Setting(32, value) => laser = Some(value),
-                Reply::Setting(30, value) => s_max = Some(value),
-                _ => {}
+            if let Reply::Setting(number, value) = reply {
+                settings.insert(number, value);
             }
         }
-        if laser != Some(1.0) {
+        let setting = |number: u32| settings.get(&number).copied();
+        if setting(32) != Some(1.0) {
             return not_ready(
                 "the controller is not in laser mode ($32=1): its beam would stay on between cuts and in a pause. Set $32=1, then send again"
                     .into(),
             );
         }
-        let Some(s_max) = s_max else {
+        let Some(s_max) = setting(30) else {
             return not_ready("the controller does not tell its full power ($30)".into());
         };
         if let Some(wanted) = self.options.s_max
@@ -180,14 +218,123 @@ impl Sender<'_> {
                 self.job.largest_s()
             ));
         }
-        self.check_modal_state()?;
-        Ok(buffer)
+        let system = self.check_modal_state()?;
+        let mut facts = Facts {
+            buffer,
+            firmware,
+            unit_mm: if setting(13).is_some_and(|v| v != 0.0) {
+                25.4
+            } else {
+                1.0
+            },
+            homes: setting(22).is_some_and(|v| v != 0.0),
+            system: if self.job.names_first_system() {
+                "G54".into()
+            } else {
+                system
+            },
+            tolerance_mm: tolerance_mm(&setting),
+            offset_mm: [0.0; 3],
+            position_mm: None,
+        };
+        self.link.unit_mm = facts.unit_mm;
+        if self.cuts.is_some_and(|cuts| !cuts.is_empty()) {
+            self.locate(&mut facts)?;
+        }
+        self.survey(&setting, &letters, &facts)?;
+        Ok(facts)
+    }
+
+    /// Tells what is set otherwise than the machine's profile says, and refuses a job that would leave the travel.
+    fn survey(
+        &self,
+        setting: &dyn Fn(u32) -> Option<f64>,
+        letters: &str,
+        facts: &Facts,
+    ) -> Result<(), SendError> {
+        let Some((machine, reach)) = self.options.made_for.as_deref() else {
+            return Ok(());
+        };
+        let mut survey = Survey::settings(setting, machine);
+        // FluidNC has each axis's range in a file of its own.
+        let tells_travel = machine.controller != machine::Controller::FluidNc;
+        if let Some(reach) = reach.as_ref().filter(|_| tells_travel)
+            && facts.position_mm.is_some()
+        {
+            survey.travel(setting, letters, reach, facts.offset_mm);
+        }
+        for warning in &survey.warned {
+            self.progress.note(&format!("warning: {warning}"));
+        }
+        match survey.refused.first() {
+            None => Ok(()),
+            Some(why) => Err(SendError::NotReady { why: why.clone() }),
+        }
+    }
+
+    /// Where the job's zero point lies, and where the head stands.
+    pub(super) fn locate(&mut self, facts: &mut Facts) -> Result<(), SendError> {
+        let mut offset_mm = [0.0; 3];
+        for reply in self.ask("$#")? {
+            if let Reply::Message(text) = reply
+                && let Some((name, values)) = text
+                    .trim_start_matches('[')
+                    .trim_end_matches(']')
+                    .split_once(':')
+                && (name == facts.system || name == "G92")
+                && let Some(values) = triple(values)
+            {
+                for (sum, value) in offset_mm.iter_mut().zip(values) {
+                    *sum += value * facts.unit_mm;
+                }
+            }
+        }
+        facts.offset_mm = offset_mm;
+        facts.position_mm = Some(self.ask_status()?);
+        Ok(())
+    }
+
+    /// The size of the controller's receive buffer, as far as it is believed, and the letters of its build options.
+    fn ask_buffer(&mut self) -> Result<(usize, String), SendError> {
+        let mut buffer = None;
+        let mut letters = String::new();
+        for reply in self.ask("$I")? {
+            if let Reply::Message(text) = reply
+                && let Some(options) = text.strip_prefix("[OPT:")
+            {
+                let mut fields = options.trim_end_matches(']').split(',');
+                fields.next().unwrap_or("").clone_into(&mut letters);
+                buffer = fields.nth(1).and_then(|f| f.parse::<usize>().ok());
+            }
+        }
+        // FluidNC does not tell: then the profile must.
+        let told = buffer.filter(|&b| b >= 82).or(self.options.buffer);
+        let Some(told) = told.filter(|&b| b >= 82) else {
+            return Err(SendError::NotReady {
+                why: "the controller does not tell the size of its receive buffer ($I), and neither does the machine's profile (receive_buffer_bytes): it is not known how much can be sent at once"
+                    .into(),
+            });
+        };
+        // One byte less than told: grblHAL tells the size of a ring that holds one less. And never more than the
+        // profile says, nor more than any of these boards has: a damaged number must not overrun the real buffer.
+        let believed = told
+            .min(self.options.buffer.unwrap_or(LARGEST_BUFFER))
+            .min(LARGEST_BUFFER);
+        Ok((believed - 1, letters))
     }
 
     /// The beam must be off before the job, and no startup block may light it after a reset: blocks run after every
-    /// one of them, also after the one that ends a stop.
-    fn check_modal_state(&mut self) -> Result<(), SendError> {
+    /// one of them, also after the one that ends a stop. Gives the coordinate system in force.
+    fn check_modal_state(&mut self) -> Result<String, SendError> {
+        let mut system = "G54".to_owned();
         for reply in self.ask("$G")? {
+            if let Reply::Message(text) = &reply
+                && let Some(found) = text
+                    .split([' ', ':', ']'])
+                    .find(|w| ["G54", "G55", "G56", "G57", "G58", "G59"].contains(w))
+            {
+                found.clone_into(&mut system);
+            }
             if let Reply::Message(text) = reply
                 && text.starts_with("[GC:")
                 && text
@@ -215,11 +362,11 @@ impl Sender<'_> {
                 });
             }
         }
-        Ok(())
+        Ok(system)
     }
 
     /// Asks for a status and waits for it.
-    fn ask_status(&mut self) -> Result<MachineState, SendError> {
+    pub(super) fn ask_status(&mut self) -> Result<Status, SendError> {
         let deadline = self.now() + ANSWER;
         self.link
             .send(b"?")
@@ -231,7 +378,7 @@ impl Sender<'_> {
                 .reply_before(deadline)
                 .map_err(|source| self.connect_error(source))?
             {
-                Some(Reply::Status(status)) => return Ok(status.state),
+                Some(Reply::Status(status)) => return Ok(status),
                 Some(_) => {}
                 None => {
                     return Err(SendError::NoController {

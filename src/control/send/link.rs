@@ -8,19 +8,34 @@ use crate::control::Transport;
 use crate::control::reply::Reply;
 
 /// Lines in, bytes out.
-pub(super) struct Link<'a> {
+pub(in crate::control) struct Link<'a> {
     pub transport: &'a mut dyn Transport,
     pub partial: Vec<u8>,
     pub lines: VecDeque<Reply>,
+    /// What the controller's lengths are in, mm.
+    pub unit_mm: f64,
 }
 
-impl Link<'_> {
+impl<'a> Link<'a> {
+    /// A line on which nothing was heard yet.
+    pub fn new(transport: &'a mut dyn Transport) -> Self {
+        Self {
+            transport,
+            partial: Vec::new(),
+            lines: VecDeque::new(),
+            unit_mm: 1.0,
+        }
+    }
+
     /// The next reply, waiting for it until `deadline`. It looks at the line once even if that has passed, and it
     /// comes back in time however much noise the line carries.
     pub fn reply(&mut self, deadline: Duration) -> io::Result<Option<Reply>> {
         loop {
             if let Some(reply) = self.lines.pop_front() {
-                return Ok(Some(reply));
+                return Ok(Some(match reply {
+                    Reply::Status(status) => Reply::Status(status.scaled(self.unit_mm)),
+                    other => other,
+                }));
             }
             let now = self.transport.now();
             let mut buffer = [0; 512];

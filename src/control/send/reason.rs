@@ -32,6 +32,13 @@ pub enum StopReason {
     },
     /// An answer that no line was waiting for, or a line that got none: bytes were lost or damaged.
     Ledger(String),
+    /// The head is where no line of the job takes it.
+    Astray {
+        /// Distance to the nearest place on the job's way, mm.
+        by_mm: f64,
+    },
+    /// The journal cannot be written, so the job could not be resumed.
+    Journal(String),
     /// The job was acknowledged to its end and the machine stands, but its beam is on.
     BeamOn {
         /// The power told, S.
@@ -64,6 +71,14 @@ impl fmt::Display for StopReason {
                 f,
                 "{what}: bytes were lost or damaged on the way; use a shorter, better shielded cable"
             ),
+            Self::Astray { by_mm } => write!(
+                f,
+                "the head is {by_mm:.1} mm from where the job can have taken it: a line was damaged on the way, or the controller's zero point was moved"
+            ),
+            Self::Journal(why) => write!(
+                f,
+                "the journal cannot be written ({why}), and without it the job could not be resumed: make room on the disk"
+            ),
             Self::BeamOn { s } => write!(
                 f,
                 "the job has ended but the machine reports power S{s}: its beam was on while standing"
@@ -73,7 +88,7 @@ impl fmt::Display for StopReason {
 }
 
 /// GRBL's errors, in words for a person.
-pub(super) fn error_words(number: u32) -> &'static str {
+pub(in crate::control) fn error_words(number: u32) -> &'static str {
     match number {
         1 | 2 => "a word of it is damaged",
         8 => "it must be idle for this",
@@ -89,7 +104,7 @@ pub(super) fn error_words(number: u32) -> &'static str {
 }
 
 /// GRBL's alarms, in words for a person.
-fn alarm_words(number: u32) -> &'static str {
+pub(in crate::control) fn alarm_words(number: u32) -> &'static str {
     match number {
         1 => "a limit switch was hit; position may be lost",
         2 => "the job leaves the machine's travel",

@@ -13,6 +13,8 @@ pub struct SendReport {
     pub acknowledged: usize,
     /// Bytes sent for them.
     pub bytes: u64,
+    /// Cuts of the job that are proven to be made; of a job that cannot be followed 0.
+    pub cuts: usize,
     /// From the first byte of the job to the report that the machine stands, s on the link's clock.
     pub time_s: f64,
     /// The most bytes that were unanswered at any moment.
@@ -79,6 +81,10 @@ pub struct Confirmed {
     pub acknowledged: usize,
     /// The number in the file of the last line acknowledged.
     pub last_line: Option<usize>,
+    /// Cuts of the job; 0 for one that cannot be followed.
+    pub cuts: usize,
+    /// Cuts that are proven to be made, of the first so many.
+    pub proven: usize,
     /// The last position that the machine told, mm.
     pub position_mm: Option<[f64; 3]>,
     /// What is known about the beam.
@@ -94,6 +100,9 @@ impl fmt::Display for Confirmed {
         )?;
         if let Some(line) = self.last_line {
             write!(f, ", the last one line {line} of the file")?;
+        }
+        if self.cuts > 0 {
+            write!(f, "; {} of {} cuts proven made", self.proven, self.cuts)?;
         }
         if let Some([x, y, _]) = self.position_mm {
             write!(f, "; last position told: X{x:.3} Y{y:.3}")?;

@@ -29,6 +29,8 @@ impl Sender<'_> {
             sent: self.sent,
             acknowledged: self.acknowledged,
             last_line,
+            cuts: self.cuts.map_or(0, |c| c.len() + self.earlier),
+            proven: self.earlier + self.proven,
             position_mm: self.status.as_ref().and_then(|s| s.position_mm),
             proof,
         })
@@ -46,11 +48,14 @@ impl Sender<'_> {
     /// The link gave an error. Often it is only hurt: the machine is stopped all the same, as far as it listens.
     pub(super) fn link_failed(&mut self, source: io::Error) -> SendError {
         match self.stop_sequence(false) {
-            Ok(proof @ Proof::BeamOff { .. }) => SendError::LinkLost {
-                port: self.port(),
-                source,
-                confirmed: self.confirmed(proof),
-            },
+            Ok(proof @ Proof::BeamOff { .. }) => {
+                self.note_stopped(&proof);
+                SendError::LinkLost {
+                    port: self.port(),
+                    source,
+                    confirmed: self.confirmed(proof),
+                }
+            }
             _ => self.link_lost(source),
         }
     }
@@ -64,12 +69,16 @@ impl Sender<'_> {
                 | StopReason::Refused { .. }
                 | StopReason::Paused { .. }
                 | StopReason::BeamOn { .. }
+                | StopReason::Journal(_)
         );
         match self.stop_sequence(trusted) {
-            Ok(proof) => SendError::Stopped {
-                reason,
-                confirmed: self.confirmed(proof),
-            },
+            Ok(proof) => {
+                self.note_stopped(&proof);
+                SendError::Stopped {
+                    reason,
+                    confirmed: self.confirmed(proof),
+                }
+            }
             Err(source) => self.link_lost(source),
         }
     }
@@ -77,11 +86,11 @@ impl Sender<'_> {
     /// Brings the machine to rest and shows that it is dark. `trusted`: nothing so far speaks against its position.
     ///
     /// An error in the first half (the hold) does not end it: the reset is what puts the beam out.
-    fn stop_sequence(&mut self, trusted: bool) -> io::Result<Proof> {
+    pub(super) fn stop_sequence(&mut self, trusted: bool) -> io::Result<Proof> {
         let (stood, undisturbed) = self
             .link
             .send(b"!")
-            .and_then(|()| self.wait_until_still())
+            .and_then(|()| self.wait_until_still(trusted))
             .unwrap_or_default();
         // Also when it does not stand: in motion a reset puts the beam out at once.
         let mut banner = false;
@@ -140,7 +149,7 @@ impl Sender<'_> {
 
     /// Polls until a report says that the machine stands. First: whether one did in time. Second: whether nothing was
     /// heard that a controller says only when it starts anew, or never.
-    fn wait_until_still(&mut self) -> io::Result<(bool, bool)> {
+    fn wait_until_still(&mut self, trusted: bool) -> io::Result<(bool, bool)> {
         let start = self.now();
         let mut deadline = start + ANSWER;
         let mut undisturbed = true;
@@ -153,6 +162,9 @@ impl Sender<'_> {
                 match reply {
                     Reply::Status(status) => {
                         let state = status.state;
+                        if trusted && undisturbed {
+                            self.sight(&status);
+                        }
                         self.status = Some(status);
                         running = state == MachineState::Run;
                         match state {

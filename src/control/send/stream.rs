@@ -4,16 +4,24 @@ use std::io;
 use std::time::Duration;
 
 use super::reason::StopReason;
-use super::{Sender, Trouble};
+use super::{Sender, Streaming, Trouble};
 use crate::control::reply::{MachineState, Reply};
 
+/// How often the status is asked for while only a proof is waited for: it decides how long the machine stands, and it has
+/// nothing else to do.
+const WAITING_POLL: Duration = Duration::from_millis(25);
+
 impl Sender<'_> {
-    /// Fills the controller's buffer as far as it is known to be free.
+    /// Fills the controller's buffer as far as it is known to be free, and as far as proofs allow.
     fn fill(&mut self, buffer: usize) -> io::Result<()> {
         let mut batch = Vec::new();
         while let Some((text, _)) = self.job.line(self.sent) {
             let cost = text.len() + 1;
-            if self.in_flight + cost > buffer {
+            let full = match self.options.streaming {
+                Streaming::Counted => self.in_flight + cost > buffer,
+                Streaming::Answered => !self.ledger.is_empty(),
+            };
+            if full || self.held_back() {
                 break;
             }
             batch.extend_from_slice(text.as_bytes());
@@ -48,6 +56,9 @@ impl Sender<'_> {
         let mut idle_since: Option<Duration> = None;
         let mut idle_reports = 0;
         let mut held_since: Option<Duration> = None;
+        // Reports in a row that were asked for with everything sent answered, and show the machine idle.
+        let mut asked_rested = false;
+        let mut rests = 0;
         let patience = Duration::try_from_secs_f64(self.job.longest_dwell_s())
             .unwrap_or(Duration::from_secs(3600))
             + Duration::from_secs(3);
@@ -55,8 +66,15 @@ impl Sender<'_> {
             if self.progress.interrupted() {
                 return Err(Trouble::Stop(StopReason::Interrupted));
             }
+            let before = self.sent;
             self.fill(buffer)?;
+            if self.sent != before {
+                (asked_rested, rests) = (false, 0);
+            }
             let now = self.now();
+            if self.held_back() {
+                next_poll = next_poll.min(now + WAITING_POLL);
+            }
             if let Some(asked) = asked_at
                 && now.saturating_sub(asked) > self.options.silence
             {
@@ -66,6 +84,7 @@ impl Sender<'_> {
             if now >= next_poll {
                 next_poll = now + self.options.poll;
                 if asked_at.is_none() {
+                    asked_rested = self.ledger.is_empty();
                     self.link.send(b"?")?;
                     asked_at = Some(now);
                 }
@@ -99,6 +118,11 @@ impl Sender<'_> {
                     let asked = asked_at.take();
                     let state = status.state;
                     let s = status.s;
+                    rests = match asked_rested && asked.is_some() && state == MachineState::Idle {
+                        true => rests + 1,
+                        false => 0,
+                    };
+                    self.follow(&status, rests >= 2)?;
                     self.status = Some(status);
                     let holding = matches!(state, MachineState::Hold(_) | MachineState::Door(_));
                     match held_since {

@@ -17,7 +17,7 @@ use self::arc::Arc;
 use self::block::{Block, Motion};
 use self::torch::Torch;
 use self::words::{Line, Value, line as parse};
-use super::verify::{Finding, Rule};
+use super::finding::{Finding, Rule};
 use crate::base::units::short;
 use crate::machine::{Controller, HeightControl, Machine, Tool};
 

@@ -6,7 +6,7 @@ use super::block::{Block, Motion, Output};
 use super::words::material_feed;
 use super::{Beam, Dialect, Program, State};
 use crate::base::units::short;
-use crate::gcode::verify::{Finding, Rule};
+use crate::gcode::finding::{Finding, Rule};
 
 /// Longer than any pierce, seconds.
 const LONGEST_PIERCE_S: f64 = 60.0;

@@ -76,7 +76,8 @@ pub(super) fn html(
         out.push_str("</table>\n");
     }
     card(&mut out, plan);
-    out.push_str("</body></html>\n");
+    out.push_str(&super::plot::place());
+    out.push_str("\n</body></html>\n");
     out
 }
 
@@ -93,7 +94,7 @@ fn steps(out: &mut String, plan: &CouponPlan) {
     }
     out.push_str("</li>\n<li>Hold a strip by its two grips (a hook or a bolt through the holes, or pliers) and pull slowly, one notch of the gauge after the other. Lay the card's zero on one mark of the strip, on the scale with the strip's name: at the other mark stands the stretch. Let hinges bend out of the way as they like; do not twist.</li>\n\
         <li>Write down the last stretch at which all hinges were whole, and the first at which one was not.</li>\n\
-        <li><code>kagome calibrate record FOLDER</code> asks for everything, or fill in readings.csv and add <code>--readings readings.csv</code>; then <code>kagome calibrate fit FOLDER/readings.toml</code>.</li></ol>\n");
+        <li><code>kagome calibrate record FOLDER</code> asks for everything, or fill in readings.csv and add <code>--readings readings.csv</code>; then <code>kagome calibrate fit FOLDER/readings.toml</code>, which draws what it found at the end of this page.</li></ol>\n");
 }
 
 /// The gauge card at true size.

@@ -1,8 +1,11 @@
 //! A coupon with everything that goes with it: jobs that were proved, drawings, the table to fill in, and a guide.
 
 mod guide;
+mod plot;
 
 use serde_json::{Value, json};
+
+pub use plot::{FitPlot, with_fit};
 
 use super::MakeError;
 use super::cut::{CutResult, prove};

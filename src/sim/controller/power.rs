@@ -44,6 +44,15 @@ impl Controller {
         self.reboot();
     }
 
+    /// Somebody moves the head by hand, by so much, mm, and the controller does not notice. At rest only.
+    pub fn push_head(&mut self, shift_mm: [f64; 3]) {
+        if self.running.is_none() {
+            for (zero, shift) in self.zero.iter_mut().zip(shift_mm) {
+                *zero += shift;
+            }
+        }
+    }
+
     /// The controller starts anew, without an alarm: its reset line was pulled (as by DTR when the port is opened), or
     /// its supply dipped. The head stays where it is, but the controller has forgotten where that is, and calls it
     /// zero.

@@ -159,8 +159,11 @@ impl Controller {
         }
     }
 
-    /// The motors stop at once, and the beam goes out.
+    /// The beam goes out, and the motors stop at once.
     pub(super) fn stop_motion(&mut self) {
+        // First the beam: the head runs on dark.
+        let head = self.head_mm();
+        self.shine(head, Light::DARK);
         self.halt();
         self.rest(Light::DARK);
     }

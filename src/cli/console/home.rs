@@ -1,0 +1,25 @@
+//! `kagome home`.
+
+use clap::Args;
+
+use super::{ConsoleArgs, at_machine, tell};
+use crate::cli::{Failure, Global, Terminal};
+
+/// Run the homing cycle, dark
+#[derive(Args, Clone, Debug)]
+#[command(
+    after_help = "Example:\n  kagome home --port /dev/ttyUSB0\n\nCtrl-C ends the cycle by a reset; the machine is locked then."
+)]
+pub struct HomeArgs {
+    #[command(flatten)]
+    at: ConsoleArgs,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// [`Failure`]: it does not home, or a switch was not found.
+pub fn run(args: &HomeArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
+    let status = at_machine(&args.at.port, terminal, |console| console.home())?;
+    tell(&status, "homed", global)
+}

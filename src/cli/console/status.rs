@@ -1,0 +1,66 @@
+//! `kagome status`.
+
+use clap::Args;
+
+use super::{at_machine, place};
+use crate::cli::port_args::PortArgs;
+use crate::cli::{Failure, Global, Terminal, print, print_json};
+use crate::control::{Survey, work_mm};
+
+/// Show what the machine is, where it stands, and how its settings differ from its profile
+#[derive(Args, Clone, Debug)]
+#[command(
+    after_help = "Example:\n  kagome status --port /dev/ttyUSB0\n\nNothing is moved or changed. On most boards the opening of the port alone is a reset."
+)]
+pub struct StatusArgs {
+    #[command(flatten)]
+    port: PortArgs,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// [`Failure`]: no controller answers.
+pub fn run(args: &StatusArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
+    let machine = args.port.profile()?;
+    let (status, told, settings, banner) = at_machine(&args.port, terminal, |console| {
+        let settings = console.settings()?;
+        let told = console.told()?;
+        let status = console.status()?;
+        Ok((status, told, settings, console.banner.clone()))
+    })?;
+    let survey = Survey::settings(&|number| settings.number(number), &machine);
+    if global.json {
+        return print_json(&serde_json::json!({
+            "state": format!("{:?}", status.state),
+            "machine_mm": if status.is_work { None } else { status.position_mm },
+            "work_mm": work_mm(&status),
+            "s": status.s,
+            "banner": banner,
+            "told": told,
+            "profile": machine.name,
+            "differs": survey.warned,
+        }));
+    }
+    let mut lines = vec![format!("{:?}; {}", status.state, place(&status))];
+    if let Some(s) = status.s {
+        lines.push(if s > 0.0 {
+            format!("THE BEAM IS ON: S{s}")
+        } else {
+            "the beam is off".into()
+        });
+    }
+    lines.push(format!("modes {}", told.modes));
+    for (name, values) in &told.offsets {
+        if values.iter().any(|v| *v != 0.0) {
+            let values: Vec<String> = values.iter().map(ToString::to_string).collect();
+            lines.push(format!("{name} {}", values.join(" ")));
+        }
+    }
+    lines.extend(told.build);
+    if survey.warned.is_empty() {
+        lines.push(format!("set as the profile {} says", machine.name));
+    }
+    lines.extend(survey.warned.iter().map(|w| format!("differs: {w}")));
+    print(&(lines.join("\n") + "\n"))
+}
