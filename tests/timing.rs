@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use kagome::base::progress::Silent;
 use kagome::control::JobRules;
-use kagome::sim::{Settings, estimate, rehearse};
+use kagome::sim::{Flavour, Settings, estimate, rehearse};
 
 /// Where a job comes from.
 #[derive(Clone, Copy)]
@@ -178,13 +178,13 @@ impl Recording {
         }
     }
 
-    /// Dwells and starvation are to 3 %, everything else to 0.3 %.
+    /// Dwells and starvation are to 0.5 %, everything else to 0.02 %.
     fn tolerance(&self) -> f64 {
         let hard = ["dwells", "starved", "the same"];
         if hard.iter().any(|word| self.name.contains(word)) {
-            0.03
+            0.005
         } else {
-            0.003
+            0.0002
         }
     }
 }
@@ -268,6 +268,8 @@ fn each_part_of_the_model_is_needed_by_a_recording() {
     missed("dwells", |s| s.step_idle_delay_ms = 255.0);
     missed("uneven axes", |s| s.acceleration_mm_s2[1] = 800.0);
     missed("to and fro", |s| s.junction_deviation_mm = 0.5);
+    // Without the lateness of GRBL's step timer.
+    missed("slits of stars", |s| s.flavour = Flavour::FluidNc);
 }
 
 #[test]
@@ -275,4 +277,52 @@ fn a_line_that_the_controller_refuses_has_no_time() {
     let text = "G21G90\nM4S500\nG2X10F500\nM5\n";
     let error = estimate(text, &Settings::default()).unwrap_err();
     assert!(error.line == 3 && error.number == 35, "{error}");
+}
+
+/// The switchings of the beam of a recording, s from its first step, from `tests/data/timing/beam.txt`.
+fn recorded(name: &str) -> Vec<f64> {
+    let path = format!("{}/tests/data/timing/beam.txt", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).unwrap();
+    let section = text.split(&format!("[{name}]\n")).nth(1).unwrap();
+    let section = section.split('[').next().unwrap();
+    section
+        .split_whitespace()
+        .map(|t| t.parse().unwrap())
+        .collect()
+}
+
+/// How far a switching may be from the recorded one, ms: 12, and 5 more a dwell. How fast an 8-bit board reads lines
+/// that it cannot read fast enough varies by 2 % from one circle to the next of the same size, which is not modelled.
+fn off_by_ms(name: &str) -> f64 {
+    match name {
+        "starved circles" => 350.0,
+        "slits with dwells" | "the same, motors on" => 12.0 + 5.0 * 16.0,
+        "dwells" | "dwells, motors on" => 12.0 + 5.0 * 12.0,
+        _ => 12.0,
+    }
+}
+
+#[test]
+fn the_simulated_machine_switches_its_beam_when_the_recorded_one_did() {
+    let mut table = String::from("recording: switchings, earliest and latest, ms\n");
+    let mut wrong = Vec::new();
+    for r in recordings() {
+        let times = recorded(r.name);
+        assert_eq!(times.len(), 2 * r.beam_periods, "{}", r.name);
+        let (text, rules) = (r.text(), JobRules::default());
+        let s = rehearse(text.as_bytes(), &r.settings(), &rules, &Silent).unwrap();
+        assert_eq!(times.len(), s.beam_changes.len(), "{}", r.name);
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (k, (time, change)) in times.iter().zip(&s.beam_changes).enumerate() {
+            assert_eq!(change.on, k % 2 == 0, "{}", r.name);
+            let off_ms = (change.at_s - time) * 1e3;
+            (low, high) = (low.min(off_ms), high.max(off_ms));
+        }
+        table += &format!("{:25} {:4} {low:+8.2} {high:+8.2}\n", r.name, times.len());
+        if low < -off_by_ms(r.name) || high > off_by_ms(r.name) {
+            wrong.push(r.name);
+        }
+    }
+    println!("{table}");
+    assert!(wrong.is_empty(), "{wrong:?}\n{table}");
 }

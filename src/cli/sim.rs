@@ -9,18 +9,26 @@ use super::profiles::machine_named;
 use super::{Failure, Global, Terminal};
 use crate::base::progress::Progress as _;
 use crate::sim::pty::{Link, PtyServer, Serve};
+use crate::sim::tcp::TcpServer;
 use crate::sim::{Controller, RehearsalSummary, Settings};
 
-/// Serve the simulated machine on a pseudo-terminal, for this and other senders
+/// Serve the simulated machine on a pseudo-terminal or on TCP, for this and other senders
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  \
     kagome sim --link /tmp/laser --speed max &\n  \
     kagome send mask/job.nc --port /tmp/laser\n\n\
-    The path of the pseudo-terminal is the first line printed. Ctrl-C ends the machine; what was burnt is printed then.")]
+    kagome sim --tcp 127.0.0.1:2300 --machine diode-400-fluidnc\n\n\
+    The path of the pseudo-terminal, or the address, is the first line printed. Ctrl-C ends the machine; what was burnt is printed then.")]
 pub struct SimArgs {
     /// A symbolic link to the pseudo-terminal, under a name that does not change
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
+    /// Listen on TCP instead: an address and a port, 0 for any that is free. One client at a time
+    #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "link")]
+    tcp: Option<String>,
+    /// Start as after power-up where the profile has homing: locked until homed
+    #[arg(long)]
+    locked: bool,
     /// The machine's profile
     #[arg(long, value_name = "NAME|FILE", default_value = crate::machine::DEFAULT)]
     machine: String,
@@ -49,6 +57,17 @@ fn speed(text: &str) -> Result<Speed, String> {
     }
 }
 
+/// Says where the machine is to be found.
+fn announce(global: &Global, kind: &str, place: &str) {
+    if global.json {
+        println!("{}", serde_json::json!({ kind: place }));
+    } else {
+        println!("{place}");
+    }
+    // Programs that wait for it read from a pipe.
+    let _ = std::io::stdout().flush();
+}
+
 /// Serves until Ctrl-C, or until the sender leaves.
 pub fn run(args: &SimArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
     let machine = {
@@ -61,29 +80,35 @@ pub fn run(args: &SimArgs, global: &Global, terminal: &Terminal) -> Result<(), F
             machine.name, machine.controller
         )));
     }
-    let mut server = PtyServer::open().map_err(Failure::bad)?;
-    let _link = match &args.link {
-        Some(path) => Some(Link::new(path, server.path()).map_err(Failure::bad)?),
-        None => None,
-    };
-    let path = server.path().to_owned();
-    if global.json {
-        println!("{}", serde_json::json!({ "port": path }));
-    } else {
-        println!("{path}");
-    }
-    // Programs that wait for the path read from a pipe.
-    let _ = std::io::stdout().flush();
-    let mut controller = Controller::new(Settings::of_machine(&machine));
-    let how = Serve {
+    let mut settings = Settings::of_machine(&machine);
+    settings.homing = args.locked && machine.homing.enabled;
+    let mut how = Serve {
         speed: args.speed.0,
         once: args.once,
         reset_on_open: machine.connection.is_some_and(|c| c.reset_on_open)
             && !args.no_reset_on_open,
     };
-    server.run(&mut controller, how, |_| terminal.interrupted());
+    let stop = |_: &Controller| terminal.interrupted();
+    let mut controller;
+    if let Some(address) = &args.tcp {
+        let mut server = TcpServer::open(address).map_err(Failure::bad)?;
+        announce(global, "tcp", &server.address().to_string());
+        // No line of 10 bits a byte, and none that pulls a reset.
+        settings.baud = None;
+        how.reset_on_open = false;
+        controller = Controller::new(settings);
+        server.run(&mut controller, how, stop);
+    } else {
+        let mut server = PtyServer::open().map_err(Failure::bad)?;
+        let _link = match &args.link {
+            Some(path) => Some(Link::new(path, server.path()).map_err(Failure::bad)?),
+            None => None,
+        };
+        announce(global, "port", server.path());
+        controller = Controller::new(settings);
+        server.run(&mut controller, how, stop);
+    }
     // The line is gone, the machine is not: what it had in its buffers still runs, as on a real one.
-    drop(server);
     controller.run_out(3600.0);
     let summary = RehearsalSummary::of(&controller);
     if global.json {

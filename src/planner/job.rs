@@ -4,7 +4,7 @@
 //! Two clocks: one reads lines and waits where the firmware waits, the other moves. Lines are taken to be sent as fast
 //! as they are read.
 
-use super::{Limits, Motion, Profile, Queue, dark_before_stop_s};
+use super::{Limits, Motion, Profile, Queue, StepTimer, dark_before_stop_s};
 
 /// Share of the time of reading a line that it takes while nothing moves: making steps takes the rest. From recordings
 /// of GRBL on an AVR with dwells in a streamed job.
@@ -23,6 +23,8 @@ pub struct Firmware {
     pub dwell_piece_s: f64,
     /// Steps per mm of X, Y, Z.
     pub steps_per_mm: [f64; 3],
+    /// What makes the steps, if that is known.
+    pub step_timer: Option<StepTimer>,
 }
 
 /// A motion, and what it is made from.
@@ -160,7 +162,8 @@ impl Run {
 /// What a job takes on a controller with these limits, from rest to rest. O(n) for n steps.
 pub fn estimate(steps: &[Step], limits: &Limits, firmware: &Firmware) -> Estimate {
     let mut run = Run {
-        queue: Queue::new(*limits, firmware.planner_blocks),
+        queue: Queue::new(*limits, firmware.planner_blocks)
+            .timed(firmware.step_timer, firmware.steps_per_mm),
         running: None,
         first_s: None,
         last_s: 0.0,
@@ -237,6 +240,7 @@ mod tests {
         stop_delay_s: 0.0,
         dwell_piece_s: 0.0,
         steps_per_mm: [80.0; 3],
+        step_timer: None,
     };
 
     fn moves(n: usize, length: f64, bytes: u32) -> Vec<Step> {

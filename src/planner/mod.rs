@@ -20,5 +20,5 @@ pub use block::{Block, Limits, LimitsError, Move};
 pub use estimate::{Motion, plan, total_s};
 pub use job::{Estimate, Firmware, READING_AT_REST, Step, estimate};
 pub use output::dark_before_stop_s;
-pub use profile::Profile;
+pub use profile::{Profile, StepTimer};
 pub use queue::{Queue, QueueFull};

@@ -11,7 +11,10 @@ const SEGMENT_S: f64 = 0.01;
 /// a step begun at their end belongs to the next, which begins the earlier for it. `profile` is the block's last one and
 /// begins `before_s` after the block; `steps_per_mm` is that of the fastest motor along the block.
 pub fn dark_before_stop_s(profile: &Profile, before_s: f64, steps_per_mm: f64) -> f64 {
-    let whole = before_s.max(0.0) + profile.duration_s();
+    // Pieces are of time as planned; the steps that they hold may come later.
+    let stretch = profile.stretch();
+    let profile = &profile.planned();
+    let whole = before_s.max(0.0) / stretch + profile.duration_s();
     // Rounding must not make an empty piece.
     let pieces = (whole / SEGMENT_S - 1e-6).ceil().max(1.0);
     let rest = whole - (pieces - 1.0) * SEGMENT_S;
@@ -24,7 +27,7 @@ pub fn dark_before_stop_s(profile: &Profile, before_s: f64, steps_per_mm: f64) -
     } else {
         0.0
     };
-    (rest + early).min(whole)
+    (rest + early).min(whole) * stretch
 }
 
 #[cfg(test)]

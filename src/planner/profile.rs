@@ -1,5 +1,29 @@
 //! Speed over time along one straight move.
 
+/// The timer that makes the steps, of GRBL on an AVR: it counts whole cycles of the clock and runs one longer than it
+/// is set to, so every step comes late by a cycle or a few.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepTimer {
+    /// The clock, Hz.
+    pub clock_hz: f64,
+}
+
+impl StepTimer {
+    /// Ranges of speed, mm/s, and by how many cycles a step is late there. Slow steps are made of 2, 4 or 8 ticks, so
+    /// that all axes are smooth; each tick is one cycle late, a step's cycles are rounded up (half a cycle on
+    /// average) and a tick's down.
+    fn bands(&self, steps_per_mm: f64) -> impl Iterator<Item = (f64, f64, f64)> {
+        [
+            (0.0, 2000.0, 5.0),
+            (2000.0, 4000.0, 3.0),
+            (4000.0, 8000.0, 2.0),
+            (8000.0, f64::INFINITY, 1.5),
+        ]
+        .into_iter()
+        .map(move |(least, most, cycles)| (least / steps_per_mm, most / steps_per_mm, cycles))
+    }
+}
+
 /// A trapezoid of speed: up to a peak, along it, down to the exit; each part may be empty. Starts at time 0, place 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Profile {
@@ -10,6 +34,8 @@ pub struct Profile {
     parts_s: [f64; 3],
     length_mm: f64,
     acceleration_mm_s2: f64,
+    /// By how much it lasts longer than planned, as a share.
+    late: f64,
 }
 
 impl Profile {
@@ -42,6 +68,7 @@ impl Profile {
                 parts_s: [first, (rest / nominal).max(0.0), last],
                 length_mm,
                 acceleration_mm_s2: acceleration,
+                late: 0.0,
             };
         }
         let peak = meeting.min(nominal.max(entry).max(exit));
@@ -62,6 +89,7 @@ impl Profile {
             parts_s: [up, cruise, down],
             length_mm,
             acceleration_mm_s2: acceleration,
+            late: 0.0,
         }
     }
 
@@ -84,6 +112,7 @@ impl Profile {
             parts_s: [0.0, 0.0, (entry - exit) / acceleration],
             length_mm: length,
             acceleration_mm_s2: acceleration,
+            late: 0.0,
         }
     }
 
@@ -98,7 +127,57 @@ impl Profile {
     /// How long it takes, s.
     #[inline]
     pub fn duration_s(&self) -> f64 {
+        self.planned_s() * (1.0 + self.late)
+    }
+
+    /// How many times longer it lasts than planned.
+    pub(super) fn stretch(&self) -> f64 {
+        1.0 + self.late
+    }
+
+    /// The same as planned.
+    pub(super) fn planned(&self) -> Self {
+        Self { late: 0.0, ..*self }
+    }
+
+    fn planned_s(&self) -> f64 {
         self.parts_s[0] + self.parts_s[1] + self.parts_s[2]
+    }
+
+    /// The same motion made by this timer, which is a little late with each step: `steps_per_mm` are those of the
+    /// motor that makes most of them.
+    pub fn timed(mut self, timer: &StepTimer, steps_per_mm: f64) -> Self {
+        let planned_s = self.planned_s();
+        if planned_s > 0.0 && self.length_mm > 0.0 {
+            self.late = self.late_cycles(steps_per_mm, timer) / timer.clock_hz / planned_s;
+        }
+        self
+    }
+
+    /// Clock cycles by which all its steps together are late.
+    fn late_cycles(&self, steps_per_mm: f64, timer: &StepTimer) -> f64 {
+        let ramp = |from: f64, to: f64| -> f64 {
+            let (low, high) = if from < to { (from, to) } else { (to, from) };
+            timer
+                .bands(steps_per_mm)
+                .map(|(least, most, cycles)| {
+                    let (a, b) = (low.max(least), high.min(most));
+                    if b > a {
+                        cycles * (b * b - a * a) / (2.0 * self.acceleration_mm_s2)
+                    } else {
+                        0.0
+                    }
+                })
+                .sum()
+        };
+        let cruise_mm = self.parts_s[1] * self.peak_mm_s;
+        let cruise: f64 = timer
+            .bands(steps_per_mm)
+            .filter(|(least, most, _)| (*least..*most).contains(&self.peak_mm_s))
+            .map(|(_, _, cycles)| cycles * cruise_mm)
+            .sum();
+        let ramps = ramp(self.entry_mm_s, self.peak_mm_s) + ramp(self.peak_mm_s, self.exit_mm_s);
+        (ramps + cruise) * steps_per_mm
     }
 
     /// How far it goes, mm.
@@ -122,10 +201,10 @@ impl Profile {
     /// The place (mm from the start) and speed (mm/s) at a time from the start, clamped to the two ends.
     pub fn at(&self, time_s: f64) -> (f64, f64) {
         let [up, cruise, down] = self.parts_s;
-        if time_s >= up + cruise + down {
+        if time_s >= self.duration_s() {
             return (self.length_mm, self.exit_mm_s);
         }
-        let t = time_s.max(0.0);
+        let t = time_s.max(0.0) / (1.0 + self.late);
         let slope = if self.peak_mm_s >= self.entry_mm_s {
             self.acceleration_mm_s2
         } else {

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::{Block, Limits, Move, Profile};
+use super::{Block, Limits, Move, Profile, StepTimer};
 
 /// A ring of blocks, replanned with every one that is added so that the last can always stop.
 ///
@@ -15,6 +15,8 @@ pub struct Queue<T> {
     entries: VecDeque<Entry<T>>,
     /// Entries up to this index cannot become faster by what comes later.
     planned: usize,
+    /// What makes the steps, and their number per mm of each axis.
+    timer: Option<(StepTimer, [f64; 3])>,
 }
 
 #[derive(Clone, Debug)]
@@ -41,6 +43,15 @@ impl<T> Queue<T> {
             capacity,
             entries: VecDeque::with_capacity(capacity.min(1024)),
             planned: 0,
+            timer: None,
+        }
+    }
+
+    /// The same with motions as this timer makes them, at this number of steps per mm of each axis.
+    pub fn timed(self, timer: Option<StepTimer>, steps_per_mm: [f64; 3]) -> Self {
+        Self {
+            timer: timer.map(|timer| (timer, steps_per_mm)),
+            ..self
         }
     }
 
@@ -113,13 +124,20 @@ impl<T> Queue<T> {
     /// The fastest way along the rest of the first block, from its present speed to its planned exit.
     pub fn front_profile(&self) -> Option<Profile> {
         let front = self.entries.front()?;
-        Some(Profile::new(
+        let profile = Profile::new(
             front.block.length_mm,
             front.entry_sqr.max(0.0).sqrt(),
             front.block.nominal_mm_s,
             self.exit_sqr().max(0.0).sqrt(),
             front.block.acceleration_mm_s2,
-        ))
+        );
+        Some(match &self.timer {
+            Some((timer, steps_per_mm)) => {
+                let steps = (0..3).map(|k| front.block.direction[k].abs() * steps_per_mm[k]);
+                profile.timed(timer, steps.fold(0.0, f64::max))
+            }
+            None => profile,
+        })
     }
 
     /// Square of the planned speed at the end of the first block, (mm/s)².

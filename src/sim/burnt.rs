@@ -131,10 +131,18 @@ pub(crate) struct Bed {
     open: Option<Burn>,
     /// The output is above zero.
     glows: bool,
-    /// How often it has become so.
-    periods: usize,
+    changes: Vec<BeamChange>,
     /// Time within burns at which the output was zero already, s.
     dark_s: f64,
+}
+
+/// The output goes above zero, or to zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BeamChange {
+    /// When, s on the machine's clock.
+    pub at_s: f64,
+    /// Whether it is above zero from then on.
+    pub on: bool,
 }
 
 /// How long and how often the output was above zero.
@@ -177,8 +185,7 @@ impl Bed {
                 self.burns.push(burn);
             }
         }
-        self.periods += usize::from(light.on() && !self.glows);
-        self.glows = light.on();
+        self.glow(now_s, light.on());
         if light.on() {
             self.open = Some(Burn {
                 from_mm: at,
@@ -197,12 +204,24 @@ impl Bed {
         self.open.is_some()
     }
 
+    fn glow(&mut self, at_s: f64, on: bool) {
+        if self.glows != on {
+            self.changes.push(BeamChange { at_s, on });
+        }
+        self.glows = on;
+    }
+
     /// The output was zero already during the last moments of what ends now.
-    pub fn faded(&mut self, dark_s: f64) {
+    pub fn faded(&mut self, now_s: f64, dark_s: f64) {
         if self.glows {
             self.dark_s += dark_s;
-            self.glows = false;
+            self.glow(now_s - dark_s, false);
         }
+    }
+
+    /// Every switching of the output.
+    pub fn changes(&self) -> &[BeamChange] {
+        &self.changes
     }
 
     /// How long and how often the output was above zero until now.
@@ -211,7 +230,7 @@ impl Bed {
         let closed: f64 = self.burns.iter().map(|b| b.end_s - b.start_s).sum();
         BeamTime {
             on_s: (closed + open - self.dark_s).max(0.0),
-            periods: self.periods,
+            periods: self.changes.iter().filter(|c| c.on).count(),
         }
     }
 

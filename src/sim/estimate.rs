@@ -30,6 +30,7 @@ impl Settings {
             },
             dwell_piece_s: self.flavour.dwell_piece_s(),
             steps_per_mm: self.steps_per_mm,
+            step_timer: self.flavour.step_timer(),
         }
     }
 }

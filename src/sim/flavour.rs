@@ -5,6 +5,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::machine::Controller as Kind;
+use crate::planner::StepTimer;
 
 /// A firmware that speaks GRBL's protocol.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -51,6 +52,14 @@ impl Flavour {
         match self {
             Self::Grbl => 0.05,
             Self::GrblHal | Self::FluidNc => 0.0,
+        }
+    }
+
+    /// What makes its steps, where that is known: 16 MHz for GRBL's 8-bit boards.
+    pub(crate) fn step_timer(self) -> Option<StepTimer> {
+        match self {
+            Self::Grbl => Some(StepTimer { clock_hz: 16e6 }),
+            Self::GrblHal | Self::FluidNc => None,
         }
     }
 

@@ -1,9 +1,10 @@
 //! The simulated machine on a pseudo-terminal, for senders in other processes: ours and everyone else's.
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use super::controller::Controller;
+
+pub use super::serve::Serve;
 
 /// Why the machine cannot be served.
 #[derive(Debug, thiserror::Error)]
@@ -30,32 +31,6 @@ pub enum PtyError {
         source: std::io::Error,
     },
 }
-
-/// How to serve.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Serve {
-    /// The machine's seconds per second of the wall; none for as fast as the other side feeds it.
-    pub speed: Option<f64>,
-    /// End when the other side has closed the port and the machine has come to rest.
-    pub once: bool,
-    /// Start anew whenever the port is opened, as boards do whose reset hangs on DTR.
-    pub reset_on_open: bool,
-}
-
-impl Default for Serve {
-    fn default() -> Self {
-        Self {
-            speed: Some(1.0),
-            once: false,
-            reset_on_open: true,
-        }
-    }
-}
-
-/// How long the wall waits for bytes at a time.
-const WAIT: Duration = Duration::from_millis(2);
-/// How far the machine may run ahead between two looks at the line, s, when it goes as fast as it can.
-const STRIDE_S: f64 = 0.05;
 
 /// A symbolic link that is removed with its owner.
 #[derive(Debug)]
@@ -99,11 +74,12 @@ impl Drop for Link {
 #[cfg(unix)]
 mod unix {
     use std::io::{self, Read as _, Write as _};
-    use std::time::Instant;
+    use std::time::{Duration, Instant};
 
     use serialport::{SerialPort as _, TTYPort};
 
-    use super::{Controller, Duration, PtyError, STRIDE_S, Serve, WAIT};
+    use super::{Controller, PtyError, Serve};
+    use crate::sim::serve::{Heard, Port, WAIT, run};
 
     /// One side of a pseudo-terminal, with the machine behind it.
     #[derive(Debug)]
@@ -141,79 +117,27 @@ mod unix {
             &mut self,
             controller: &mut Controller,
             how: Serve,
-            mut stop: impl FnMut(&Controller) -> bool,
+            stop: impl FnMut(&Controller) -> bool,
         ) {
-            let mut clock = Instant::now();
-            let mut connected = false;
-            let mut ever = false;
-            let mut buffer = [0; 4096];
-            let mut out = Vec::new();
-            while !stop(controller) {
-                let heard = match self.master.read(&mut buffer) {
-                    Ok(count) => {
-                        if !connected {
-                            (connected, ever) = (true, true);
-                            controller.port_opened(how.reset_on_open);
-                        }
-                        controller.write(&buffer[..count]);
-                        count > 0
-                    }
-                    Err(error) if error.kind() == io::ErrorKind::TimedOut => {
-                        // Open, and silent.
-                        if !connected {
-                            (connected, ever) = (true, true);
-                            controller.port_opened(how.reset_on_open);
-                        }
-                        false
-                    }
-                    Err(_) => {
-                        connected = false;
-                        std::thread::sleep(WAIT);
-                        false
-                    }
-                };
-                if !connected && ever && how.once && controller.at_rest() {
-                    return;
-                }
-                match how.speed {
-                    Some(speed) => {
-                        let passed = clock.elapsed();
-                        clock += passed;
-                        let until = controller.now_s() + passed.as_secs_f64() * speed;
-                        controller.advance(until);
-                    }
-                    // Time goes by only while the machine has work, or the line has been silent for a while.
-                    None => self.hurry(controller, heard, connected),
-                }
-                out.clear();
-                controller.read(&mut out);
-                if connected && !out.is_empty() && !self.say(&out) {
-                    connected = false;
-                }
+            run(&mut self.master, controller, how, stop);
+        }
+    }
+
+    impl Port for TTYPort {
+        fn hear(&mut self, buffer: &mut [u8]) -> Heard {
+            match self.read(buffer) {
+                Ok(count) => Heard::Bytes(count),
+                // Open, and silent.
+                Err(error) if error.kind() == io::ErrorKind::TimedOut => Heard::Bytes(0),
+                Err(_) => Heard::Nobody,
             }
         }
 
-        fn hurry(&self, controller: &mut Controller, heard: bool, connected: bool) {
-            let stride = controller.now_s() + STRIDE_S;
-            if controller.hungry() && connected && heard {
-                return;
-            }
-            // Up to the first moment at which the other side has something to read.
-            while controller.now_s() < stride {
-                let next = controller.next_event_s().unwrap_or(stride).min(stride);
-                controller.advance(next);
-                if controller.has_output() {
-                    return;
-                }
-            }
-        }
-
-        /// False if nobody is there to read.
         fn say(&mut self, bytes: &[u8]) -> bool {
             let mut left = bytes;
             let give_up = Instant::now() + Duration::from_millis(500);
             while !left.is_empty() {
-                match self.master.write(left) {
+                match self.write(left) {
                     Ok(count) => left = &left[count..],
                     Err(error)
                         if error.kind() == io::ErrorKind::TimedOut && Instant::now() < give_up => {}

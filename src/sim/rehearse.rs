@@ -4,12 +4,14 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use super::burnt::{BeamTime, Burn, Stroke, strokes};
+use super::burnt::{BeamChange, BeamTime, Burn, Stroke, strokes};
 use super::controller::Controller;
 use super::link::SimTransport;
 use super::settings::Settings;
 use crate::base::progress::Progress;
-use crate::control::{Job, JobError, JobRules, SendError, SendOptions, SendReport, send};
+use crate::control::{
+    Job, JobError, JobRules, SendError, SendOptions, SendReport, Unattended, send,
+};
 
 /// What a rehearsal showed.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +26,8 @@ pub struct Rehearsal {
     pub motion_s: f64,
     /// How long and how often the beam was on.
     pub beam: BeamTime,
+    /// Every switching of the beam; times from the first motion.
+    pub beam_changes: Vec<BeamChange>,
     /// What the sender reports.
     pub report: SendReport,
     /// The figures that a person wants.
@@ -102,15 +106,24 @@ pub fn rehearse(
         buffer: Some(settings.receive_buffer),
         ..SendOptions::default()
     };
-    let report = send(&mut link, &job, &options, progress).map_err(Box::new)?;
+    let report = send(&mut link, &job, &options, &Unattended(progress)).map_err(Box::new)?;
     let controller = link.into_controller();
     let burns = controller.burns();
+    let first_s = controller.first_motion_s().unwrap_or_default();
     Ok(Rehearsal {
         strokes: strokes(&burns, step_mm(settings)),
         burns,
         time_s: report.time_s,
         motion_s: controller.motion_s(),
         beam: controller.beam_time(),
+        beam_changes: controller
+            .beam_changes()
+            .iter()
+            .map(|change| BeamChange {
+                at_s: change.at_s - first_s,
+                on: change.on,
+            })
+            .collect(),
         report,
         summary: RehearsalSummary::of(&controller),
     })

@@ -22,7 +22,7 @@ mod wires;
 
 use std::collections::VecDeque;
 
-use super::burnt::{BeamTime, Bed, Burn, Light};
+use super::burnt::{BeamChange, BeamTime, Bed, Burn, Light};
 use super::modal::{Action, Drive, Modal};
 use super::settings::Settings;
 use crate::planner::{Profile, Queue};
@@ -168,7 +168,8 @@ pub struct Controller {
 impl Controller {
     /// A machine that has just been switched on: it sends its banner.
     pub fn new(settings: Settings) -> Self {
-        let queue = Queue::new(settings.limits(), settings.planner_blocks);
+        let queue = Queue::new(settings.limits(), settings.planner_blocks)
+            .timed(settings.flavour.step_timer(), settings.steps_per_mm);
         let mut new = Self {
             queue,
             modal: Modal::new(),
@@ -271,6 +272,16 @@ impl Controller {
     /// How long and how often the beam was on until now.
     pub fn beam_time(&self) -> BeamTime {
         self.bed.beam_time(self.now_s)
+    }
+
+    /// Every switching of the beam so far, in order.
+    pub fn beam_changes(&self) -> &[BeamChange] {
+        self.bed.changes()
+    }
+
+    /// When something moved first, s.
+    pub fn first_motion_s(&self) -> Option<f64> {
+        self.motion_s.map(|[first_s, _]| first_s)
     }
 
     /// Bytes that found the receive buffer full, or the controller deaf. Real firmware does not know this number.

@@ -199,11 +199,14 @@ impl Controller {
             let steps = (0..3).map(|k| {
                 (cut.end[k] - cut.start[k]).abs() / cut.length_mm * self.settings.steps_per_mm[k]
             });
-            self.bed.faded(dark_before_stop_s(
-                &running.profile,
-                running.start_s - running.block_start_s,
-                steps.fold(0.0, f64::max),
-            ));
+            self.bed.faded(
+                self.now_s,
+                dark_before_stop_s(
+                    &running.profile,
+                    running.start_s - running.block_start_s,
+                    steps.fold(0.0, f64::max),
+                ),
+            );
         }
         self.position = cut.end;
         self.queue.pop();
