@@ -8,11 +8,12 @@ use std::fmt;
 use std::time::Duration;
 
 use kagome::base::progress::Silent;
+use kagome::base::random::Random;
 use kagome::control::journal::{Header, Journal, JournalError, MemoryStore};
 use kagome::control::{
     Cuts, Job, JobRules, Question, SendOptions, Transport, resume, send_recorded,
 };
-use kagome::sim::{At, Burn, Controller, Faults, Mishap, Settings, SimTransport, State};
+use kagome::sim::{At, Burn, Controller, Faults, Flavour, Mishap, Settings, SimTransport, State};
 
 /// One line, used by the sender and looked at by the person.
 struct Shared<'a>(&'a RefCell<SimTransport>);
@@ -98,6 +99,7 @@ struct World {
     job: Job,
     cuts: Cuts,
     bench: Bench,
+    flavour: Flavour,
     ahead: usize,
 }
 
@@ -121,6 +123,7 @@ impl World {
             job,
             cuts,
             bench,
+            flavour: Flavour::Grbl,
             ahead,
         }
     }
@@ -143,7 +146,7 @@ impl World {
             homing_seek_mm_min: 30_000.0,
             ..Settings::default()
         };
-        let mut machine = Controller::new(settings);
+        let mut machine = Controller::new(settings.with_flavour(self.flavour));
         if self.bench == Bench::Homes {
             machine.write(b"$H\n");
             machine.advance(20.0);
@@ -156,6 +159,8 @@ impl World {
 
     fn options() -> SendOptions {
         SendOptions {
+            // FluidNC does not tell it.
+            buffer: Some(128),
             banner_wait: Duration::from_millis(500),
             ..SendOptions::default()
         }
@@ -470,13 +475,23 @@ fn sampled_bytes_of_a_thousand_slits_lose_none() {
     sweep(40, 1, 29, &[Bench::Homes, Bench::Plain]);
 }
 
-/// A resume is resumed.
+/// A resume is resumed, on every firmware.
 #[test]
 fn fault_upon_fault_loses_no_slit() {
-    let mut random = kagome::base::random::Random::new(11);
-    for bench in [Bench::Homes, Bench::Plain] {
-        let world = World::new(30, bench, 2);
-        for _ in 0..40 {
+    let mut random = Random::new(11);
+    for (bench, flavour) in [
+        (Bench::Homes, Flavour::Grbl),
+        (Bench::Plain, Flavour::Grbl),
+        (Bench::Homes, Flavour::GrblHal),
+        (Bench::Plain, Flavour::GrblHal),
+        (Bench::Homes, Flavour::FluidNc),
+        (Bench::Plain, Flavour::FluidNc),
+    ] {
+        let world = World {
+            flavour,
+            ..World::new(30, bench, 2)
+        };
+        for _ in 0..20 {
             let faults: Vec<(At, Fault)> = (0..4)
                 .map(|_| {
                     let at = 200 + random.bits() % 900;
@@ -490,8 +505,159 @@ fn fault_upon_fault_loses_no_slit() {
                 })
                 .collect();
             if let Err(error) = world.live(&faults, 9) {
-                panic!("{bench:?} {faults:?}: {error}");
+                panic!("{bench:?} {flavour:?} {faults:?}: {error}");
             }
         }
+    }
+}
+
+/// Late, broken up and gathered answers, and pieces that set out late: nothing overruns, nothing is missed.
+fn shaken(seeds: std::ops::Range<u64>) {
+    for seed in seeds {
+        let mut random = Random::new(seed);
+        let bench = [Bench::Homes, Bench::Plain][(seed % 2) as usize];
+        let world = World::new(12, bench, 1 + (seed % 3) as usize);
+        let faults = Faults {
+            late_s: random.between(0.0, 0.4),
+            late_sent_s: random.between(0.0, 0.2),
+            gather_s: [0.0, 0.016, 0.1][(random.bits() % 3) as usize],
+            seed,
+            ..Faults::default()
+        };
+        let store = MemoryStore::default();
+        let mut journal = Journal::new(world.header(), store);
+        let mut link = SimTransport::with_faults(world.machine(), faults);
+        let report = send_recorded(
+            &mut link,
+            &world.job,
+            &world.cuts,
+            &World::options(),
+            &Silent,
+            &mut journal,
+        )
+        .unwrap();
+        assert_eq!((report.cuts, link.controller().lost_bytes()), (12, 0));
+        assert!(report.max_in_flight < 128);
+        assert_eq!(world.judge(&link.controller().burns()), Ok(0));
+    }
+}
+
+#[test]
+fn a_shaken_line_changes_nothing_but_time() {
+    shaken(0..60);
+}
+
+#[test]
+#[ignore = "slow: run by .ci/run in release"]
+fn a_thousand_seeds_of_a_shaken_line_change_nothing_but_time() {
+    shaken(0..1000);
+}
+
+/// The program itself, killed so that nothing of it can run any more.
+#[cfg(unix)]
+mod killed {
+    use std::process::{Command, Stdio};
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+    use kagome::control::journal::{Begin, FileStore, History, path_for};
+    use kagome::sim::pty::{PtyServer, Serve};
+    use kagome::sim::strokes;
+
+    use super::*;
+
+    #[test]
+    fn a_program_that_is_killed_leaves_a_journal_to_resume_from() {
+        for (bench, kills) in [(Bench::Plain, [3, 11]), (Bench::Homes, [1, 9])] {
+            let world = World::new(16, bench, 3);
+            let folder = tempfile::tempdir().unwrap();
+            let file = folder.path().join("job.nc");
+            std::fs::write(&file, text_of(&world.slits)).unwrap();
+            let (made, over) = (
+                Arc::new(AtomicUsize::new(0)),
+                Arc::new(AtomicBool::new(false)),
+            );
+            let mut server = PtyServer::open().unwrap();
+            let path = server.path().to_owned();
+            let thread = {
+                let (made, over, mut machine) = (made.clone(), over.clone(), world.machine());
+                std::thread::spawn(move || {
+                    let how = Serve {
+                        speed: Some(4.0),
+                        once: false,
+                        reset_on_open: bench == Bench::Homes,
+                    };
+                    server.run(&mut machine, how, |m| {
+                        made.store(strokes(&m.burns(), 0.0125).len(), Ordering::SeqCst);
+                        over.load(Ordering::SeqCst)
+                    });
+                    machine
+                })
+            };
+            let start = |verb: &str| {
+                let mut command = Command::new(env!("CARGO_BIN_EXE_kagome"));
+                command.env("KAGOME_PROFILES", "").arg(verb).arg(&file);
+                command.args(["--port", &path]);
+                if verb == "resume" {
+                    command.args(["--home", "--at-reference"]);
+                }
+                command.stdout(Stdio::null()).stderr(Stdio::piped());
+                command.spawn().unwrap()
+            };
+            if bench == Bench::Homes {
+                // The port resets the board, which is then locked: a send refuses, and says so.
+                let refused = start("send").wait_with_output().unwrap();
+                let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+                assert!(said.contains("home it"), "{said}");
+            }
+            let mut verb = "send";
+            if bench == Bench::Homes {
+                // As if a first run had homed and begun.
+                begin(&world, &path_for(&file));
+                verb = "resume";
+            }
+            for kill in kills {
+                let mut child = start(verb);
+                while made.load(Ordering::SeqCst) < kill {
+                    std::thread::sleep(Duration::from_millis(3));
+                    if let Some(status) = child.try_wait().unwrap() {
+                        let output = child.wait_with_output().unwrap();
+                        panic!("{status}: {}", String::from_utf8_lossy(&output.stderr));
+                    }
+                }
+                child.kill().unwrap();
+                child.wait().unwrap();
+                let bytes = std::fs::read(path_for(&file)).unwrap();
+                let proven = History::read(&bytes).unwrap().proven;
+                assert!(proven <= kill + 3, "{proven} proven at {kill}");
+                verb = "resume";
+            }
+            let output = start("resume").wait_with_output().unwrap();
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert!(output.status.success(), "{bench:?}: {said}");
+            over.store(true, Ordering::SeqCst);
+            let mut machine = thread.join().unwrap();
+            machine.run_out(60.0);
+            assert!(!machine.beam_on());
+            let twice = world.judge(&machine.burns()).unwrap();
+            println!("{bench:?}: {twice} of 16 slits cut twice after 2 kills");
+            assert!(twice <= 3 * kills.len());
+        }
+    }
+
+    /// A journal that says: begun, homed, nothing proven.
+    fn begin(world: &World, path: &std::path::Path) {
+        let mut header = world.header();
+        header.machine.clear();
+        let mut journal = Journal::new(header, FileStore::new(path));
+        journal
+            .begin(Begin {
+                cut: 0,
+                system: "G54".into(),
+                offset_mm: [ZERO_MM[0], ZERO_MM[1], 0.0],
+                homes: true,
+                firmware: "Grbl".into(),
+            })
+            .unwrap();
     }
 }

@@ -6,6 +6,10 @@
 //! running job goes through a feed hold, a reset and a status report that shows the beam off, or says in plain words
 //! that this could not be confirmed ([`Proof`]).
 //!
+//! What is cut is known from where the head is, not from what was acknowledged ([`Cuts`], [`Follower`]). It is written to
+//! a [`journal`] on the disk before it counts, and the sender never runs further ahead of it than a few cuts
+//! ([`send_recorded`]); so after whatever happened a job goes on at the first cut that is not proven ([`resume`]).
+//!
 //! What software cannot do: an M3 (constant power) beam stays on after the cable is pulled, until the firmware ends
 //! it. M4 goes dark by itself when motion ends; so M3 is refused unless asked for.
 

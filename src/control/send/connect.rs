@@ -35,6 +35,16 @@ pub(super) struct Facts {
     pub offset_mm: [f64; 3],
     /// The report of where it stands, if the job cuts anything.
     pub position_mm: Option<Status>,
+    /// Letters of its build options (`$I`).
+    letters: String,
+    /// Its settings, by number.
+    settings: BTreeMap<u32, f64>,
+}
+
+impl Facts {
+    fn setting(&self) -> impl Fn(u32) -> Option<f64> + '_ {
+        |number| self.settings.get(&number).copied()
+    }
 }
 
 /// How far a report may be from where the job says the head is: half of the last decimal in each axis, an end rounded to
@@ -166,7 +176,9 @@ impl Sender<'_> {
     pub(super) fn connect_and_check(&mut self) -> Result<Facts, SendError> {
         let firmware = self.connect()?;
         self.check_idle()?;
-        self.preflight(firmware)
+        let facts = self.preflight(firmware)?;
+        self.survey_travel(&facts)?;
+        Ok(facts)
     }
 
     /// The machine must be ready.
@@ -236,33 +248,40 @@ impl Sender<'_> {
             tolerance_mm: tolerance_mm(&setting),
             offset_mm: [0.0; 3],
             position_mm: None,
+            letters,
+            settings: settings.clone(),
         };
         self.link.unit_mm = facts.unit_mm;
         if self.cuts.is_some_and(|cuts| !cuts.is_empty()) {
             self.locate(&mut facts)?;
         }
-        self.survey(&setting, &letters, &facts)?;
+        self.survey_settings(&facts)?;
         Ok(facts)
     }
 
-    /// Tells what is set otherwise than the machine's profile says, and refuses a job that would leave the travel.
-    fn survey(
-        &self,
-        setting: &dyn Fn(u32) -> Option<f64>,
-        letters: &str,
-        facts: &Facts,
-    ) -> Result<(), SendError> {
-        let Some((machine, reach)) = self.options.made_for.as_deref() else {
+    /// Tells what is set otherwise than the machine's profile says.
+    fn survey_settings(&self, facts: &Facts) -> Result<(), SendError> {
+        match self.options.made_for.as_deref() {
+            Some((machine, _)) => self.judge(&Survey::settings(&facts.setting(), machine)),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses a job that would leave the travel from where its zero point lies.
+    pub(super) fn survey_travel(&self, facts: &Facts) -> Result<(), SendError> {
+        let Some((machine, Some(reach))) = self.options.made_for.as_deref() else {
             return Ok(());
         };
-        let mut survey = Survey::settings(setting, machine);
         // FluidNC has each axis's range in a file of its own.
-        let tells_travel = machine.controller != machine::Controller::FluidNc;
-        if let Some(reach) = reach.as_ref().filter(|_| tells_travel)
-            && facts.position_mm.is_some()
-        {
-            survey.travel(setting, letters, reach, facts.offset_mm);
+        if machine.controller == machine::Controller::FluidNc || facts.position_mm.is_none() {
+            return Ok(());
         }
+        let mut survey = Survey::default();
+        survey.travel(&facts.setting(), &facts.letters, reach, facts.offset_mm);
+        self.judge(&survey)
+    }
+
+    fn judge(&self, survey: &Survey) -> Result<(), SendError> {
         for warning in &survey.warned {
             self.progress.note(&format!("warning: {warning}"));
         }

@@ -261,6 +261,7 @@ impl Sender<'_> {
             }
             self.set_zero(&mut facts, None)?;
         }
+        self.survey_travel(&facts)?;
         Ok((facts, false))
     }
 
@@ -321,6 +322,7 @@ impl Sender<'_> {
         self.link.unit_mm = facts.unit_mm;
         self.check_idle()?;
         self.locate(&mut facts)?;
+        self.survey_travel(&facts)?;
         Ok(facts)
     }
 
