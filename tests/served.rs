@@ -29,6 +29,16 @@ impl Line {
         }
     }
 
+    /// What is said up to this, within ten seconds.
+    fn until(&mut self, end: &str) -> String {
+        let give_up = Instant::now() + Duration::from_secs(10);
+        let mut said = String::new();
+        while !said.contains(end) && Instant::now() < give_up {
+            said += &self.hear(0.02);
+        }
+        said
+    }
+
     /// What is said within a time.
     fn hear(&mut self, seconds: f64) -> String {
         let until = Instant::now() + Duration::from_secs_f64(seconds);
@@ -145,6 +155,45 @@ fn one_client_at_a_time_and_the_machine_outlives_each_of_them() {
     let said = third.hear(0.3);
     assert!(said.contains("<Idle|MPos:50.000,0.000,0.000"), "{said}");
     assert!(!said.contains("Grbl"), "{said}");
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+#[test]
+fn a_locked_machine_is_homed_and_what_happens_to_it_is_seen_by_the_client() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_kagome"))
+        .env("KAGOME_PROFILES", "")
+        .args(["sim", "--tcp", "127.0.0.1:0", "--speed", "200"])
+        .args([
+            "--machine",
+            "co2-600x400",
+            "--locked",
+            "--mishap",
+            "limit-switch@600",
+        ])
+        .args([
+            "--mishap",
+            "power-loss@640",
+            "--mishap",
+            "power-returns@700",
+        ])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let address: SocketAddr = lines.next().unwrap().unwrap().parse().unwrap();
+    let mut line = Line::open(address);
+    line.send(b"?").unwrap();
+    assert!(line.hear(0.2).contains("<Alarm|MPos:0.000"));
+    line.send(b"$H\n").unwrap();
+    let said = line.until("ok\r\n");
+    assert!(said.contains("ok"), "{said}");
+    line.send(b"?").unwrap();
+    let said = line.until(">");
+    assert!(said.contains("<Idle|MPos:-1.000,-1.000"), "{said}");
+    let said = line.until("to unlock");
+    let (alarm, banner) = (said.find("ALARM:1"), said.find("Grbl 1.1h"));
+    assert!(alarm.is_some() && alarm < banner, "{said}");
     child.kill().unwrap();
     child.wait().unwrap();
 }

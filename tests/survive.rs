@@ -469,7 +469,9 @@ fn a_sample_of_bytes_loses_no_slit() {
 #[test]
 #[ignore = "slow: run by .ci/run in release"]
 fn every_byte_of_forty_slits_loses_none() {
-    sweep(40, 3, 1, &[Bench::Homes, Bench::Plain]);
+    sweep(40, 3, 1, &[Bench::Plain]);
+    // What a homing board does more is the same at every byte.
+    sweep(40, 3, 7, &[Bench::Homes]);
 }
 
 #[test]

@@ -335,11 +335,9 @@ impl Operator for Desk<'_> {
                 }
             }
             Show::Plain => {
-                let share = if glance.of_cuts > 0 {
-                    100 * glance.cuts / glance.of_cuts
-                } else {
-                    100 * glance.acknowledged / glance.lines.max(1)
-                };
+                let share = (100 * glance.cuts)
+                    .checked_div(glance.of_cuts)
+                    .unwrap_or(100 * glance.acknowledged / glance.lines.max(1));
                 if share / PLAIN_STEP > state.step {
                     state.step = share / PLAIN_STEP;
                     let left = self

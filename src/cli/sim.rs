@@ -10,7 +10,7 @@ use super::{Failure, Global, Terminal};
 use crate::base::progress::Progress as _;
 use crate::sim::pty::{Link, PtyServer, Serve};
 use crate::sim::tcp::TcpServer;
-use crate::sim::{Controller, RehearsalSummary, Settings};
+use crate::sim::{Controller, Mishap, RehearsalSummary, Settings};
 
 /// Serve the simulated machine on a pseudo-terminal or on TCP, for this and other senders
 #[derive(Args, Debug)]
@@ -29,6 +29,10 @@ pub struct SimArgs {
     /// Start as after power-up where the profile has homing: locked until homed
     #[arg(long)]
     locked: bool,
+    /// Something that happens to the machine at a time on its clock, s: power-loss, power-returns, reboot, hang or
+    /// limit-switch. May be given several times
+    #[arg(long, value_name = "WHAT@SECONDS", value_parser = mishap)]
+    mishap: Vec<(f64, Mishap)>,
     /// The machine's profile
     #[arg(long, value_name = "NAME|FILE", default_value = crate::machine::DEFAULT)]
     machine: String,
@@ -55,6 +59,26 @@ fn speed(text: &str) -> Result<Speed, String> {
         Ok(value) if (0.01..=1000.0).contains(&value) => Ok(Speed(Some(value))),
         _ => Err("a number from 0.01 to 1000, or max".into()),
     }
+}
+
+fn mishap(text: &str) -> Result<(f64, Mishap), String> {
+    const SHAPE: &str =
+        "as reboot@12.5: power-loss, power-returns, reboot, hang or limit-switch, and a time in s";
+    let (what, at) = text.split_once('@').ok_or(SHAPE)?;
+    let at_s = at
+        .parse::<f64>()
+        .ok()
+        .filter(|at_s| at_s.is_finite() && *at_s >= 0.0)
+        .ok_or(SHAPE)?;
+    let mishap = match what {
+        "power-loss" => Mishap::PowerLoss,
+        "power-returns" => Mishap::PowerReturns([0.0; 3]),
+        "reboot" => Mishap::Reboot,
+        "hang" => Mishap::Hang,
+        "limit-switch" => Mishap::LimitSwitch,
+        _ => return Err(SHAPE.into()),
+    };
+    Ok((at_s, mishap))
 }
 
 /// Says where the machine is to be found.
@@ -89,6 +113,13 @@ pub fn run(args: &SimArgs, global: &Global, terminal: &Terminal) -> Result<(), F
             && !args.no_reset_on_open,
     };
     let stop = |_: &Controller| terminal.interrupted();
+    let switched_on = |settings: Settings| {
+        let mut controller = Controller::new(settings);
+        for &(at_s, mishap) in &args.mishap {
+            controller.schedule(at_s, mishap);
+        }
+        controller
+    };
     let mut controller;
     if let Some(address) = &args.tcp {
         let mut server = TcpServer::open(address).map_err(Failure::bad)?;
@@ -96,7 +127,7 @@ pub fn run(args: &SimArgs, global: &Global, terminal: &Terminal) -> Result<(), F
         // No line of 10 bits a byte, and none that pulls a reset.
         settings.baud = None;
         how.reset_on_open = false;
-        controller = Controller::new(settings);
+        controller = switched_on(settings);
         server.run(&mut controller, how, stop);
     } else {
         let mut server = PtyServer::open().map_err(Failure::bad)?;
@@ -105,7 +136,7 @@ pub fn run(args: &SimArgs, global: &Global, terminal: &Terminal) -> Result<(), F
             None => None,
         };
         announce(global, "port", server.path());
-        controller = Controller::new(settings);
+        controller = switched_on(settings);
         server.run(&mut controller, how, stop);
     }
     // The line is gone, the machine is not: what it had in its buffers still runs, as on a real one.

@@ -106,14 +106,8 @@ impl SimTransport {
 
     fn strike(&mut self, mishap: Mishap) {
         self.struck.push((self.controller.now_s(), mishap));
-        match mishap {
-            Mishap::Unplug => self.cut = true,
-            Mishap::PowerLoss => self.controller.power_off(),
-            Mishap::PowerReturns(shift_mm) => self.controller.power_on(shift_mm),
-            Mishap::Reboot => self.controller.reboot(),
-            Mishap::Hang => self.controller.hang(),
-            Mishap::LimitSwitch => self.controller.limit_switch(),
-        }
+        self.cut |= mishap == Mishap::Unplug;
+        self.controller.suffer(mishap);
     }
 
     /// Those whose moment is this one.

@@ -23,6 +23,7 @@ mod wires;
 use std::collections::VecDeque;
 
 use super::burnt::{BeamChange, BeamTime, Bed, Burn, Light};
+use super::faults::Mishap;
 use super::modal::{Action, Drive, Modal};
 use super::settings::Settings;
 use crate::planner::{Profile, Queue};
@@ -108,6 +109,8 @@ pub struct Controller {
     state: State,
     life: Life,
     now_s: f64,
+    /// What will happen to it, and when.
+    due: Vec<(f64, Mishap)>,
     // The wires.
     incoming: VecDeque<(f64, u8)>,
     incoming_free_s: f64,
@@ -184,6 +187,7 @@ impl Controller {
             settings,
             life: Life::Running,
             now_s: 0.0,
+            due: Vec::new(),
             incoming: VecDeque::new(),
             incoming_free_s: 0.0,
             receive: VecDeque::new(),
@@ -318,12 +322,16 @@ impl Controller {
 
     /// The next event of the machine itself; replies on the wire are events for the host alone.
     fn next_inside_s(&self) -> f64 {
-        let mut next = f64::INFINITY;
+        let mut next = self
+            .due
+            .iter()
+            .map(|(at, _)| *at)
+            .fold(f64::INFINITY, f64::min);
         if self.life != Life::Running {
             return next;
         }
         if let Some(&(at, _)) = self.incoming.front() {
-            next = at;
+            next = next.min(at);
         }
         if let Some(running) = &self.running {
             next = next.min(running.start_s + running.profile.duration_s());
@@ -377,6 +385,10 @@ impl Controller {
     }
 
     fn settle(&mut self) {
+        while let Some(k) = self.due.iter().position(|(at, _)| *at <= self.now_s) {
+            let (_, mishap) = self.due.remove(k);
+            self.suffer(mishap);
+        }
         if self.life != Life::Running {
             return;
         }

@@ -4,6 +4,7 @@
 //! stays where it is. What does not: everything else, above all the controller's knowledge of where the head stands.
 
 use super::{Controller, State};
+use crate::sim::faults::Mishap;
 
 /// Whether anybody is at home.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,6 +19,23 @@ pub enum Life {
 }
 
 impl Controller {
+    /// Something will happen to it at this time, s. A cable is none of its own: [`Mishap::Unplug`] does nothing here.
+    pub fn schedule(&mut self, at_s: f64, mishap: Mishap) {
+        self.due.push((at_s, mishap));
+    }
+
+    /// Something happens to it now.
+    pub fn suffer(&mut self, mishap: Mishap) {
+        match mishap {
+            Mishap::Unplug => {}
+            Mishap::PowerLoss => self.power_off(),
+            Mishap::PowerReturns(shift_mm) => self.power_on(shift_mm),
+            Mishap::Reboot => self.reboot(),
+            Mishap::Hang => self.hang(),
+            Mishap::LimitSwitch => self.limit_switch(),
+        }
+    }
+
     /// Whether it runs, hangs or has no power.
     pub fn life(&self) -> Life {
         self.life
