@@ -239,6 +239,8 @@ impl Progress for Notes {
     }
 }
 
+impl kagome::control::Operator for Notes {}
+
 #[test]
 fn silence_and_strangers_are_told_by_name() {
     use kagome::control::script::Script;

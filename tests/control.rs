@@ -8,7 +8,10 @@ use std::time::Duration;
 
 use kagome::base::progress::{Progress, Silent};
 use kagome::control::script::{Exchange, Script};
-use kagome::control::{Job, JobRules, Proof, SendError, SendOptions, SendReport, StopReason, send};
+use kagome::control::{
+    Change, Glance, Job, JobRules, Operator, Proof, SendError, SendOptions, SendReport, StopReason,
+    Wish, send,
+};
 use kagome::sim::{
     At, Burn, Controller, Faults, Mishap, Settings, SimTransport, State, rehearse, strokes,
 };
@@ -163,6 +166,76 @@ fn an_unplugged_job_ends_dark_and_within_its_path_wherever_the_cable_is_cut() {
     assert!(lost_midway > 100, "{lost_midway}");
 }
 
+/// Wishes at given reports of the machine, and what was seen.
+struct Hands {
+    at: Vec<(usize, Wish)>,
+    seen: std::sync::Mutex<(usize, usize, Vec<bool>)>,
+}
+
+impl Progress for Hands {}
+
+impl Operator for Hands {
+    fn wish(&self) -> Option<Wish> {
+        let mut seen = self.seen.lock().unwrap();
+        let (_, wish) = self.at.get(seen.1).filter(|(at, _)| *at <= seen.0)?;
+        seen.1 += 1;
+        Some(*wish)
+    }
+
+    fn glance(&self, glance: &Glance<'_>) {
+        let mut seen = self.seen.lock().unwrap();
+        seen.0 += 1;
+        seen.2.push(glance.paused());
+        assert!(glance.cuts <= glance.of_cuts && glance.done_lines <= glance.lines);
+    }
+}
+
+#[test]
+fn pauses_and_overrides_change_the_time_and_nothing_else() {
+    let cuts = slits(60);
+    let text = job_of(&cuts);
+    let whole = rehearse(
+        text.as_bytes(),
+        &Settings::default(),
+        &JobRules::default(),
+        &Silent,
+    );
+    let plain_mm = whole.unwrap().summary.burnt_mm;
+    let run = |at: &[(usize, Wish)]| {
+        let hands = Hands {
+            at: at.to_vec(),
+            seen: std::sync::Mutex::default(),
+        };
+        let mut link = SimTransport::new(machine());
+        let report = send(&mut link, &checked(&text), &SendOptions::default(), &hands).unwrap();
+        assert_eq!(report.cuts, cuts.len());
+        let controller = drain(link);
+        // A cut that was held in its middle is two strokes, end to end.
+        let length = |sum: f64, b: &kagome::sim::Burn| sum + b.length_mm();
+        let burnt = controller.burns().iter().fold(0.0, length);
+        assert!((burnt - plain_mm).abs() < 0.05, "{burnt} {plain_mm}");
+        only_on(&cuts, &controller.burns());
+        assert!(!controller.beam_on());
+        let paused = hands.seen.into_inner().unwrap().2;
+        (report.time_s, paused.iter().filter(|p| **p).count())
+    };
+    let (plain, never) = run(&[]);
+    assert_eq!(never, 0);
+    let (held, reports) = run(&[(10, Wish::Pause), (40, Wish::Resume)]);
+    assert!(
+        reports > 20 && held > plain + 2.0,
+        "{held} {plain} {reports}"
+    );
+    let twice = [
+        (10, Wish::Feed(Change::Less)),
+        (11, Wish::Feed(Change::Less)),
+    ];
+    let (slow, _) = run(&twice);
+    assert!(slow > 1.05 * plain, "{slow} {plain}");
+    let (back, _) = run(&[twice[0], twice[1], (12, Wish::Feed(Change::Reset))]);
+    assert!(back < slow, "{back} {slow}");
+}
+
 /// Asks to stop after this many answers.
 struct StopAfter(AtomicUsize);
 
@@ -176,6 +249,8 @@ impl Progress for StopAfter {
         self.0.load(Ordering::SeqCst) == 0
     }
 }
+
+impl Operator for StopAfter {}
 
 #[test]
 fn ctrl_c_stops_the_machine_with_proof_and_keeps_its_position() {
@@ -373,6 +448,8 @@ fn a_panic_while_sending_puts_the_beam_out() {
             assert!(!self.0.interrupted(), "a bug, half way");
         }
     }
+
+    impl kagome::control::Operator for Panics {}
     let mut link = SimTransport::new(machine());
     let text = job_of(&slits(30));
     let job = checked(&text);

@@ -1,6 +1,10 @@
 //! The proof by position against the simulated machine, which knows what is burnt.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests fail by panicking"
+)]
 
 use kagome::control::{Cuts, Follower, Job, JobRules, MachineState, Reply, Sighting};
 use kagome::sim::{Controller, Settings};

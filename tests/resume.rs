@@ -1,6 +1,10 @@
 //! Journals, resumes and refusals: what the sender does when something does not fit.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests fail by panicking"
+)]
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -8,7 +12,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use kagome::base::progress::{Progress, Silent};
 use kagome::control::journal::{Header, History, Journal, MemoryStore};
 use kagome::control::{
-    Confirmed, Cuts, Job, JobRules, Proof, Question, SendError, SendOptions, SendReport,
+    Confirmed, Cuts, Job, JobRules, Operator, Proof, Question, SendError, SendOptions, SendReport,
     StopReason, Streaming, resume, send_recorded,
 };
 use kagome::sim::{At, Controller, Faults, Mishap, Settings, SimTransport};
@@ -52,7 +56,7 @@ impl Bench {
     fn send(
         &self,
         link: &mut SimTransport,
-        progress: &dyn Progress,
+        progress: &dyn Operator,
     ) -> Result<SendReport, SendError> {
         let mut journal = Journal::new(self.header(), self.store.clone());
         send_recorded(
@@ -105,6 +109,8 @@ impl Progress for StopAfter {
         self.0.load(Ordering::SeqCst) == 0
     }
 }
+
+impl Operator for StopAfter {}
 
 fn stopped(result: Result<SendReport, SendError>) -> (StopReason, Confirmed) {
     match result {
@@ -223,6 +229,8 @@ fn a_panic_is_stopped_with_proof_and_can_be_resumed() {
             self.1.lock().unwrap().push(text.to_owned());
         }
     }
+
+    impl Operator for Panics {}
     let bench = Bench::new(30);
     let mut link = machine(Settings::default());
     let progress = Panics(StopAfter(AtomicUsize::new(30)), Mutex::default());

@@ -1,7 +1,11 @@
 //! Whatever happens to cable, controller, power or host, at whatever byte: the job is resumed, no slit is lost, few are
 //! cut twice, and the beam is never where it should not be. Judged by the sheet of the simulated machine.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests fail by panicking"
+)]
 
 use std::cell::RefCell;
 use std::fmt;
@@ -496,7 +500,7 @@ fn fault_upon_fault_loses_no_slit() {
                 .map(|_| {
                     let at = 200 + random.bits() % 900;
                     let fault = FAULTS[(random.bits() % 4) as usize];
-                    let way = if random.bits() % 2 == 0 {
+                    let way = if random.bits().is_multiple_of(2) {
                         At::Sent(at)
                     } else {
                         At::Received(at * 4)

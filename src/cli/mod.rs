@@ -6,6 +6,7 @@
 pub mod calibrate;
 pub mod console;
 pub mod cut;
+mod desk;
 pub mod flatten;
 pub mod form;
 pub mod inspect;

@@ -79,17 +79,22 @@ pub fn run(args: &ResumeArgs, global: &Global, terminal: &Terminal) -> Result<()
     let header = ready.header(&what.job, &cuts);
     let mut journal = Journal::continued(header, &bytes, FileStore::new(&path))
         .map_err(|error| here(error.to_string()))?;
+    let desk = ready.desk(global, terminal);
     let report = ready.at_port(terminal, |port| {
         resume(
             port,
             &ready.job,
             &cuts,
             &ready.options,
-            terminal,
+            &desk,
             &mut journal,
-            &mut |question| args.answer(question, terminal),
+            &mut |question| {
+                desk.release_keys();
+                args.answer(question, terminal)
+            },
         )
     })?;
+    drop(desk);
     print(global, &report, None);
     Ok(())
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::cut::drawing_of;
+use super::desk::{Desk, Show, Timetable};
 use super::port_args::{self, SIM, port_of, remember};
 use super::profiles::{machine_named, own_folder};
 use super::terminal::agrees;
@@ -158,6 +159,27 @@ impl Ready {
         Header::of(&self.job, cuts, &name, machine, ahead as usize)
     }
 
+    /// What the person sees and presses while it runs.
+    pub fn desk<'a>(&self, global: &Global, terminal: &'a Terminal) -> Desk<'a> {
+        let show = match (global.json, global.quiet) {
+            (true, _) => Show::Events,
+            (false, true) => Show::Nothing,
+            (false, false) if terminal.is_watched() && std::io::stdin().is_terminal() => Show::Line,
+            (false, false) => Show::Plain,
+        };
+        Desk::new(terminal, show, Timetable::of(&self.job, &self.settings()))
+    }
+
+    /// What the controller is taken for where a time is estimated.
+    fn settings(&self) -> Settings {
+        let mut settings = self
+            .machine
+            .as_ref()
+            .map_or_else(Settings::default, Settings::of_machine);
+        settings.s_max = self.options.s_max.unwrap_or(settings.s_max);
+        settings
+    }
+
     /// What will happen, in words.
     fn words(&self, cuts: Option<&Cuts>) -> Vec<String> {
         let mut lines = Vec::new();
@@ -181,11 +203,7 @@ impl Ready {
             ),
             None => "will burn nothing".into(),
         });
-        let mut settings = self
-            .machine
-            .as_ref()
-            .map_or_else(Settings::default, Settings::of_machine);
-        settings.s_max = self.options.s_max.unwrap_or(settings.s_max);
+        let settings = self.settings();
         let text = String::from_utf8_lossy(&self.text);
         let time = estimate(&text, &settings).ok().map(|e| e.time_s);
         let cuts = cuts.map_or_else(String::new, |c| format!("{} cuts, ", c.len()));
@@ -212,7 +230,7 @@ impl Ready {
             terminal.note(&line);
         }
         agrees(
-            "Is the sheet in place, the lid closed, and will you stay? begin",
+            "Does the sheet lie in its place, and will you stay beside the machine",
             terminal,
         )
     }
@@ -336,6 +354,7 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
     if !args.yes && !ready.agreed(cuts.as_ref(), terminal) {
         return Err(Failure::No("nothing was sent".into()));
     }
+    let desk = ready.desk(global, terminal);
     let report = ready.at_port(terminal, |port| {
         if args.check {
             Console::open(port, terminal)
@@ -345,20 +364,13 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
                 })?;
         }
         let Some(cuts) = &cuts else {
-            return send(port, &ready.job, &ready.options, terminal);
+            return send(port, &ready.job, &ready.options, &desk);
         };
         let path = journal::path_for(&what.job);
         tell_of_old(&path, terminal);
         let header = ready.header(&what.job, cuts);
         let mut journal = Journal::new(header, FileStore::new(&path));
-        let sent = send_recorded(
-            port,
-            &ready.job,
-            cuts,
-            &ready.options,
-            terminal,
-            &mut journal,
-        );
+        let sent = send_recorded(port, &ready.job, cuts, &ready.options, &desk, &mut journal);
         if let Err(error) = &sent
             && error.confirmed().is_some()
         {
@@ -370,6 +382,7 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
         }
         sent
     })?;
+    drop(desk);
     print(global, &report, None);
     Ok(())
 }
@@ -425,7 +438,7 @@ pub(super) fn print(global: &Global, report: &SendReport, summary: Option<&Rehea
     if global.json {
         println!(
             "{}",
-            serde_json::json!({ "report": report, "rehearsal": summary })
+            serde_json::json!({ "event": "end", "report": report, "rehearsal": summary })
         );
         return;
     }

@@ -39,7 +39,12 @@ impl Drop for ExitGuard {
 
 /// A line on standard error. A terminal that was closed is no reason to panic in the middle of a job.
 fn tell(text: &str) {
-    let _ = writeln!(std::io::stderr(), "{text}");
+    // While keys are read a terminal does not go back to the line's beginning by itself.
+    let mut text = format!("{text}\n");
+    if std::io::stderr().is_terminal() {
+        text = text.replace('\n', "\r\n");
+    }
+    let _ = std::io::stderr().write_all(text.as_bytes());
 }
 
 /// Asks the person at the terminal; anything but yes is no, also a terminal that was closed.
@@ -109,6 +114,26 @@ impl Terminal {
     /// The flag that Ctrl-C raises, for code that must react faster than by polling [`Progress`].
     pub fn stop_flag(&self) -> Arc<AtomicBool> {
         self.stop.clone()
+    }
+
+    /// Whether there is a person at a terminal who sees what is shown, and is not to be left alone.
+    pub(super) fn is_watched(&self) -> bool {
+        self.bar.is_some()
+    }
+
+    /// Shows a line in place of the one that was shown.
+    pub(super) fn show(&self, text: &str) {
+        if let Some(Ok(mut bar)) = self.bar.as_ref().map(Mutex::lock) {
+            if bar.is_finished() || bar.is_hidden() {
+                bar.finish_and_clear();
+                *bar = ProgressBar::new_spinner().with_style(
+                    ProgressStyle::with_template("{wide_msg}")
+                        .unwrap_or_else(|_| ProgressStyle::default_spinner()),
+                );
+            }
+            bar.set_message(text.to_owned());
+            bar.tick();
+        }
     }
 
     /// Removes the progress bar, before results are printed.

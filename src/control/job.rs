@@ -225,7 +225,7 @@ impl Job {
     ///
     /// # Errors
     /// The index of a line that became too long for the controller.
-    pub(super) fn from_line(
+    pub(super) fn starting_at_line(
         &self,
         first: usize,
         lead: &[String],

@@ -18,6 +18,7 @@ mod console;
 mod follow;
 mod job;
 pub mod journal;
+mod operator;
 mod port;
 mod reply;
 pub mod script;
@@ -35,6 +36,7 @@ pub use console::{
 };
 pub use follow::{Cut, Cuts, Follower, NotFollowed, Sighting};
 pub use job::{Job, JobError, JobRules};
+pub use operator::{Change, Glance, Operator, Unattended, Wish};
 pub use port::{OpenPort, usb_name};
 pub use reply::{MachineState, Reply, Status};
 pub use send::{

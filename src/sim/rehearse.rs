@@ -9,7 +9,9 @@ use super::controller::Controller;
 use super::link::SimTransport;
 use super::settings::Settings;
 use crate::base::progress::Progress;
-use crate::control::{Job, JobError, JobRules, SendError, SendOptions, SendReport, send};
+use crate::control::{
+    Job, JobError, JobRules, SendError, SendOptions, SendReport, Unattended, send,
+};
 
 /// What a rehearsal showed.
 #[derive(Clone, Debug, PartialEq)]
@@ -104,7 +106,7 @@ pub fn rehearse(
         buffer: Some(settings.receive_buffer),
         ..SendOptions::default()
     };
-    let report = send(&mut link, &job, &options, progress).map_err(Box::new)?;
+    let report = send(&mut link, &job, &options, &Unattended(progress)).map_err(Box::new)?;
     let controller = link.into_controller();
     let burns = controller.burns();
     let first_s = controller.first_motion_s().unwrap_or_default();

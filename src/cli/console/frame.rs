@@ -8,7 +8,7 @@ use crate::base::units::{fixed, short};
 use crate::cli::port_args::{self, port_of, remember};
 use crate::cli::send::{failure, machine_for};
 use crate::cli::{Failure, Global, Terminal, print, print_json};
-use crate::control::{Job, JobReach, JobRules, SendOptions, send};
+use crate::control::{Job, JobReach, JobRules, SendOptions, Unattended, send};
 
 /// What lights a mark and burns none, per cent of full power, at the most.
 const MOST_PERCENT: f64 = 5.0;
@@ -102,7 +102,7 @@ pub fn run(args: &FrameArgs, global: &Global, terminal: &Terminal) -> Result<(),
         ));
     };
     let mut line = port_args::open(&port, args.baud, machine.as_ref())?;
-    let result = send(line.as_mut(), &job, &options, terminal);
+    let result = send(line.as_mut(), &job, &options, &Unattended(terminal));
     drop(guard);
     terminal.clear();
     result.map_err(failure)?;

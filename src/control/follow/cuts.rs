@@ -121,7 +121,7 @@ impl Cuts {
 
     /// The same without the first cuts, after `lead` lines that take the place of all lines before the first one left.
     /// The way begins with a move to its beginning, which is line `travel` of those.
-    pub(crate) fn from_cut(&self, cut: usize, lead: usize, travel: usize) -> Option<Self> {
+    pub(crate) fn starting_at_cut(&self, cut: usize, lead: usize, travel: usize) -> Option<Self> {
         let first = self.cuts.get(cut)?;
         let line = |line: usize| line - first.first_line + lead;
         let mut pieces = vec![Piece {

@@ -30,9 +30,9 @@ use std::time::Duration;
 use self::connect::Facts;
 use super::follow::{Cuts, Follower};
 use super::journal::{Begin, Journal, Record};
+use super::operator::Operator;
 use super::reply::Status;
 use super::{Job, Transport};
-use crate::base::progress::Progress;
 
 pub use error::SendError;
 pub(super) use link::Link;
@@ -50,7 +50,8 @@ const ANSWER: Duration = Duration::from_secs(3);
 /// and the machine is idle with its beam off, else with an error that says what is known.
 ///
 /// The order is: wait for the banner, or reset the controller; ask what it is and how it is set; stream; wait until it
-/// is idle. The person's wish to stop is [`Progress::interrupted`].
+/// is idle. The person's wish to stop is
+/// [`Progress::interrupted`](crate::base::progress::Progress::interrupted), other wishes come from the [`Operator`].
 ///
 /// # Errors
 /// [`SendError`]; for the first three kinds the job was not begun.
@@ -58,7 +59,7 @@ pub fn send(
     transport: &mut dyn Transport,
     job: &Job,
     options: &SendOptions,
-    progress: &dyn Progress,
+    progress: &dyn Operator,
 ) -> Result<SendReport, SendError> {
     let cuts = Cuts::of(job).ok();
     let mut sender = Sender::new(transport, job, options, progress);
@@ -78,7 +79,7 @@ pub fn send_recorded(
     job: &Job,
     cuts: &Cuts,
     options: &SendOptions,
-    progress: &dyn Progress,
+    progress: &dyn Operator,
     journal: &mut Journal,
 ) -> Result<SendReport, SendError> {
     let mut sender = Sender::new(transport, job, options, progress);
@@ -104,7 +105,7 @@ struct Sender<'a> {
     link: Link<'a>,
     job: &'a Job,
     options: &'a SendOptions,
-    progress: &'a dyn Progress,
+    progress: &'a dyn Operator,
     /// The job has begun and has not been brought to an end.
     armed: bool,
     sent: usize,
@@ -129,6 +130,8 @@ struct Sender<'a> {
     astray: u32,
     /// The last work offset told, mm.
     offset_mm: [f64; 3],
+    /// When the first line went out.
+    started: Duration,
 }
 
 impl Drop for Sender<'_> {
@@ -146,7 +149,7 @@ impl<'a> Sender<'a> {
         transport: &'a mut dyn Transport,
         job: &'a Job,
         options: &'a SendOptions,
-        progress: &'a dyn Progress,
+        progress: &'a dyn Operator,
     ) -> Self {
         Self {
             link: Link::new(transport),
@@ -169,6 +172,7 @@ impl<'a> Sender<'a> {
             allowed: usize::MAX,
             astray: 0,
             offset_mm: [0.0; 3],
+            started: Duration::ZERO,
         }
     }
 
@@ -217,6 +221,7 @@ impl<'a> Sender<'a> {
         self.progress
             .start("sending", u64::try_from(self.job.len()).ok());
         let start = self.now();
+        self.started = start;
         self.armed = true;
         // A bug here, or in what shows the progress, must not leave a running machine to itself.
         let result = catch_unwind(AssertUnwindSafe(|| self.stream(facts.buffer)));

@@ -143,7 +143,7 @@ impl Restart {
         let before = (!named).then_some((moving, now.motion));
         let count = lead.len();
         let rest = job
-            .from_line(first.first_line, &lead, before)
+            .starting_at_line(first.first_line, &lead, before)
             .map_err(|line| {
                 let number = job.line(line).map_or(0, |(_, number)| number);
                 refused(
@@ -152,7 +152,7 @@ impl Restart {
                 )
             })?;
         let cuts = cuts
-            .from_cut(cut, count, travel)
+            .starting_at_cut(cut, count, travel)
             .ok_or_else(|| refused(0, "there is no such cut"))?;
         Ok(Self { job: rest, cuts })
     }

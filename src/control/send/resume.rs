@@ -10,10 +10,10 @@ use std::time::Duration;
 use super::connect::{Facts, NOTHING};
 use super::restart::Restart;
 use super::{RESET, SendError, SendOptions, SendReport, Sender};
-use crate::base::progress::Progress;
 use crate::base::units::short;
 use crate::control::follow::Cuts;
 use crate::control::journal::{History, Journal};
+use crate::control::operator::Operator;
 use crate::control::reply::{MachineState, Reply};
 use crate::control::{Job, Transport};
 
@@ -89,7 +89,7 @@ pub fn resume(
     job: &Job,
     cuts: &Cuts,
     options: &SendOptions,
-    progress: &dyn Progress,
+    progress: &dyn Operator,
     journal: &mut Journal,
     answer: &mut dyn FnMut(&Question) -> bool,
 ) -> Result<SendReport, SendError> {
@@ -144,7 +144,7 @@ fn visit(
     cuts: &Cuts,
     (cut, is_cut): (usize, bool),
     facts: &Facts,
-    (options, progress): (&SendOptions, &dyn Progress),
+    (options, progress): (&SendOptions, &dyn Operator),
     answer: &mut dyn FnMut(&Question) -> bool,
 ) -> Result<(), SendError> {
     let not_ready = |why: &str| SendError::NotReady { why: why.into() };

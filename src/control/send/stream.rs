@@ -5,7 +5,9 @@ use std::time::Duration;
 
 use super::reason::StopReason;
 use super::{Sender, Streaming, Trouble};
-use crate::control::reply::{MachineState, Reply};
+use crate::control::follow::Cuts;
+use crate::control::operator::Glance;
+use crate::control::reply::{MachineState, Reply, Status};
 
 /// How often the status is asked for while only a proof is waited for: it decides how long the machine stands, and it has
 /// nothing else to do.
@@ -49,6 +51,21 @@ impl Sender<'_> {
         Ok(self.sent - self.ledger.len() - 1)
     }
 
+    /// Shows the person where the job is.
+    fn show(&self, status: &Status) {
+        let done = self.proven.checked_sub(1).and_then(|k| self.cuts?.get(k));
+        self.progress.glance(&Glance {
+            status,
+            work_mm: self.work_mm(Some(status)),
+            cuts: self.earlier + self.proven,
+            of_cuts: self.earlier + self.cuts.map_or(0, Cuts::len),
+            acknowledged: self.acknowledged,
+            lines: self.job.len(),
+            done_lines: done.map_or(0, |cut| cut.last_line + 1),
+            elapsed: self.now().saturating_sub(self.started),
+        });
+    }
+
     pub(super) fn stream(&mut self, buffer: usize) -> Result<(), Trouble> {
         let mut next_poll = self.now() + self.options.poll;
         let mut asked_at: Option<Duration> = None;
@@ -65,6 +82,9 @@ impl Sender<'_> {
         loop {
             if self.progress.interrupted() {
                 return Err(Trouble::Stop(StopReason::Interrupted));
+            }
+            while let Some(wish) = self.progress.wish() {
+                self.link.send(&[wish.byte()])?;
             }
             let before = self.sent;
             self.fill(buffer)?;
@@ -123,6 +143,7 @@ impl Sender<'_> {
                         false => 0,
                     };
                     self.follow(&status, rests >= 2)?;
+                    self.show(&status);
                     self.status = Some(status);
                     let holding = matches!(state, MachineState::Hold(_) | MachineState::Door(_));
                     match held_since {
