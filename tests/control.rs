@@ -231,7 +231,8 @@ fn pauses_and_overrides_change_the_time_and_nothing_else() {
         (11, Wish::Feed(Change::Less)),
     ];
     let (slow, _) = run(&twice);
-    assert!(slow > 1.05 * plain, "{slow} {plain}");
+    // 80 % on cuts of 7 mm: 0.255 s each instead of 0.240; rapids are as fast as before.
+    assert!(slow > 1.02 * plain, "{slow} {plain}");
     let (back, _) = run(&[twice[0], twice[1], (12, Wish::Feed(Change::Reset))]);
     assert!(back < slow, "{back} {slow}");
 }
