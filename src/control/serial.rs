@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use serialport::{ErrorKind, SerialPort, SerialPortType};
 
 use super::Transport;
+use super::transport::received;
 
 /// A port that cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -207,22 +208,7 @@ impl Transport for SerialTransport {
         self.port
             .set_timeout(wait)
             .map_err(|error| io::Error::other(error.to_string()))?;
-        match self.port.read(buffer) {
-            // Nothing to read and no timeout: the far side has gone.
-            Ok(0) => Err(io::ErrorKind::BrokenPipe.into()),
-            Ok(count) => Ok(count),
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    io::ErrorKind::TimedOut
-                        | io::ErrorKind::Interrupted
-                        | io::ErrorKind::WouldBlock
-                ) =>
-            {
-                Ok(0)
-            }
-            Err(error) => Err(error),
-        }
+        received(self.port.read(buffer), io::ErrorKind::BrokenPipe)
     }
 
     fn now(&self) -> Duration {

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::Transport;
 use super::serial::PortError;
+use super::transport::received;
 
 /// How long a controller may take to accept.
 const CONNECT: Duration = Duration::from_secs(5);
@@ -93,21 +94,8 @@ impl Transport for TcpTransport {
     fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
         self.stream
             .set_read_timeout(Some(wait.max(Duration::from_millis(1))))?;
-        match self.stream.read(buffer) {
-            Ok(0) => Err(io::ErrorKind::ConnectionAborted.into()),
-            Ok(count) => Ok(self.speech(&mut buffer[..count])),
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    io::ErrorKind::TimedOut
-                        | io::ErrorKind::Interrupted
-                        | io::ErrorKind::WouldBlock
-                ) =>
-            {
-                Ok(0)
-            }
-            Err(error) => Err(error),
-        }
+        let count = received(self.stream.read(buffer), io::ErrorKind::ConnectionAborted)?;
+        Ok(self.speech(&mut buffer[..count]))
     }
 
     fn now(&self) -> Duration {

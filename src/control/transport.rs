@@ -27,3 +27,24 @@ pub trait Transport {
     /// What to call it in messages: a path, or "the simulated machine".
     fn name(&self) -> &str;
 }
+
+/// What reading gave, where a system tells by an error that nothing came in time.
+///
+/// # Errors
+/// All other errors, and `lost` where the far side has gone.
+pub(super) fn received(read: io::Result<usize>, lost: io::ErrorKind) -> io::Result<usize> {
+    match read {
+        // Nothing to read and no timeout: the far side has gone.
+        Ok(0) => Err(lost.into()),
+        Ok(count) => Ok(count),
+        Err(error)
+            if matches!(
+                error.kind(),
+                io::ErrorKind::TimedOut | io::ErrorKind::Interrupted | io::ErrorKind::WouldBlock
+            ) =>
+        {
+            Ok(0)
+        }
+        Err(error) => Err(error),
+    }
+}

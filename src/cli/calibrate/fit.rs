@@ -134,6 +134,21 @@ pub(super) fn run(args: &FitArgs, global: &Global, terminal: &Terminal) -> Resul
     }
 }
 
+/// Whether it is a confidence that can be asked for.
+///
+/// # Errors
+/// [`Failure::Bad`].
+pub(super) fn check_confidence(confidence: f64) -> Result<(), Failure> {
+    if CONFIDENCES.contains(&confidence) {
+        return Ok(());
+    }
+    Err(Failure::Bad(format!(
+        "a confidence of {confidence} is not between {} and {}",
+        CONFIDENCES.start(),
+        CONFIDENCES.end()
+    )))
+}
+
 /// Fits, and writes the profile into the folder `own` of a person's profiles. Guides beside the readings get the picture.
 ///
 /// # Errors
@@ -143,14 +158,7 @@ pub(super) fn carry_out(
     own: Option<&Path>,
     terminal: &Terminal,
 ) -> Result<Outcome, Failure> {
-    if !CONFIDENCES.contains(&args.confidence) {
-        return Err(Failure::Bad(format!(
-            "a confidence of {} is not between {} and {}",
-            args.confidence,
-            CONFIDENCES.start(),
-            CONFIDENCES.end()
-        )));
-    }
+    check_confidence(args.confidence)?;
     let all = read(args)?;
     let base = base(&material(args, &all)?, args.name.as_deref(), own)?;
     let new: Vec<Reading> = all.iter().flat_map(|r| r.strips.clone()).collect();

@@ -6,11 +6,11 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::coupon::CouponArgs;
-use super::fit::{FitArgs, carry_out};
+use super::fit::{FitArgs, carry_out, check_confidence};
 use crate::base::atomic::{check_directory, write_directory};
 use crate::base::units::{fixed, short};
 use crate::calibrate::{
-    CONFIDENCES, Coupon, Demand, Geometry, Law, Readings, SimulatedBench, SimulatedMaterial,
+    Coupon, Demand, Geometry, Law, Readings, SimulatedBench, SimulatedMaterial,
 };
 use crate::cli::profiles::{machine_named, material_named};
 use crate::cli::surface_args::source;
@@ -270,14 +270,7 @@ pub(super) fn run(
 }
 
 fn check(args: &RehearseArgs) -> Result<(), Failure> {
-    if !CONFIDENCES.contains(&args.confidence) {
-        return Err(Failure::Bad(format!(
-            "a confidence of {} is not between {} and {}",
-            args.confidence,
-            CONFIDENCES.start(),
-            CONFIDENCES.end()
-        )));
-    }
+    check_confidence(args.confidence)?;
     let within = [
         (
             "--hidden-sigma",

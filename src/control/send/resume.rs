@@ -40,10 +40,10 @@ impl std::fmt::Display for Question {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Home => f.write_str(
-                "the controller does not know where the head stands. May it be homed now? The way to the switches must be free",
+                "the controller does not know where the head stands, and can find out by homing. The way to the switches must be free. May it be homed now",
             ),
             Self::ZeroHere => f.write_str(
-                "the controller does not know where the head stands, and this machine does not home. Does the head stand exactly over the job's zero point (X0 Y0), as when the job was begun? Move it there by hand first",
+                "the controller does not know where the head stands, and this machine does not home. Move it by hand over the job's zero point (X0 Y0), where it was when the job was begun. Does it stand exactly there",
             ),
             Self::AtReference { cut, is_cut, at_mm } => write!(
                 f,
