@@ -20,8 +20,8 @@
 //! | [`planner`] | moves, machine limits → motion in time |
 //! | [`toolpath`] | sheet → ordered cuts, the kerf allowed for |
 //! | [`gcode`] | cuts → text; text → what it burns, and a verdict |
-//! | [`control`] | job → controller over a transport, stopped with proof |
-//! | [`sim`] | a simulated GRBL laser that remembers what it burnt |
+//! | [`control`] | job → controller over a transport: checked before, followed by position, stopped with proof, resumed |
+//! | [`sim`] | a simulated laser (GRBL, grblHAL, FluidNC) with faults on command, and a sheet that remembers what was burnt |
 //! | [`calibrate`] | readings of pulled strips → the σ that holds with a stated confidence; kerf from calipers |
 //! | [`job`] | all of it: design file, verdict, report |
 //! | [`cli`] | one file a verb; the program does nothing that the library cannot |

@@ -10,6 +10,9 @@
 //! a [`journal`] on the disk before it counts, and the sender never runs further ahead of it than a few cuts
 //! ([`send_recorded`]); so after whatever happened a job goes on at the first cut that is not proven ([`resume`]).
 //!
+//! The person at the machine wishes pauses and overrides and sees where the job is through an [`Operator`]; between jobs they
+//! work with a [`Console`].
+//!
 //! What software cannot do: an M3 (constant power) beam stays on after the cable is pulled, until the firmware ends
 //! it. M4 goes dark by itself when motion ends; so M3 is refused unless asked for.
 

@@ -119,6 +119,11 @@ impl PortLock {
             .read(true)
             .write(true)
             .open(&path);
+        // Another person's file may be locked too, though not written to.
+        let opened = opened.or_else(|error| match error.kind() {
+            io::ErrorKind::PermissionDenied => File::open(&path),
+            _ => Err(error),
+        });
         let mut file = opened.map_err(failed)?;
         match file.try_lock() {
             Ok(()) => {}
