@@ -392,6 +392,7 @@ mod tests {
         for n in 0..100 {
             text.push_str(&format!("G0 X{n} Y0\nG1 Y20\n"));
         }
+        text.push_str("M5\n");
         Job::check(text.as_bytes(), &JobRules::default()).unwrap()
     }
 
