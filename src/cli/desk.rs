@@ -27,10 +27,11 @@ const PLAIN_STEP: usize = 10;
 /// Characters of the bar.
 const BAR: usize = 20;
 
-/// A second press within so many pictures ends the job.
+/// The keys, in words.
 const KEYS: &str = "p pause  +/- feed  ]/[ power  0 as made  a end";
 
 /// When each part of a job is done, by the planner.
+#[derive(Default)]
 pub(super) struct Timetable {
     /// Lines of the job, and the time at which they are done, s; ascending.
     at: Vec<(usize, f64)>,
@@ -105,7 +106,6 @@ pub(super) enum Show {
 struct State {
     shown_at: Option<Duration>,
     cuts: usize,
-    paused: bool,
     /// Time in pauses so far, and when this one began.
     paused_for: Duration,
     paused_at: Option<Duration>,
@@ -139,6 +139,11 @@ impl<'a> Desk<'a> {
                 ..State::default()
             }),
         }
+    }
+
+    /// The time of the whole job by the planner, s; none where it is not known or not shown.
+    pub fn whole_s(&self) -> Option<f64> {
+        Some(self.times.whole_s()).filter(|time| *time > 0.0)
     }
 
     /// Gives the keyboard back, so that a line can be read; the next glance takes it again.
@@ -178,7 +183,7 @@ impl<'a> Desk<'a> {
                     .note("the machine pauses: press a once more to end the job, p to go on");
                 Some(Wish::Pause)
             }
-            'p' | 'P' | ' ' => Some(if state.paused {
+            'p' | 'P' | ' ' => Some(if state.paused_at.is_some() {
                 Wish::Resume
             } else {
                 Wish::Pause
@@ -310,6 +315,7 @@ impl Operator for Desk<'_> {
             return;
         };
         let paused = glance.paused();
+        let turned = state.paused_at.is_some() != paused;
         match (state.paused_at, paused) {
             (None, true) => state.paused_at = Some(glance.elapsed),
             (Some(at), false) => {
@@ -318,7 +324,6 @@ impl Operator for Desk<'_> {
             }
             _ => {}
         }
-        let turned = std::mem::replace(&mut state.paused, paused) != paused;
         let since = |every: Duration, state: &State| {
             state
                 .shown_at
@@ -431,7 +436,7 @@ mod tests {
         };
         let press = |key: char, state: &mut State| desk.key(KeyCode::Char(key), false, state);
         assert_eq!(press('p', &mut state), Some(Wish::Pause));
-        state.paused = true;
+        state.paused_at = Some(Duration::ZERO);
         assert_eq!(press('p', &mut state), Some(Wish::Resume));
         assert_eq!(press('+', &mut state), Some(Wish::Feed(Change::More)));
         assert_eq!(press('[', &mut state), Some(Wish::Power(Change::Less)));

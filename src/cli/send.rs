@@ -19,7 +19,7 @@ use crate::control::{
     Transport, send, send_recorded,
 };
 use crate::machine::{self, Connection, HandOver, Machine};
-use crate::sim::{RehearsalError, RehearsalSummary, Settings, estimate, rehearse};
+use crate::sim::{RehearsalError, RehearsalSummary, Settings, rehearse};
 use crate::{gcode, pattern};
 
 /// Send a job to a machine, and stop it with proof if anything goes wrong
@@ -167,10 +167,14 @@ impl Ready {
             (false, false) if terminal.is_watched() && std::io::stdin().is_terminal() => Show::Line,
             (false, false) => Show::Plain,
         };
-        Desk::new(terminal, show, Timetable::of(&self.job, &self.settings()))
+        let times = match show {
+            Show::Nothing => Timetable::default(),
+            _ => Timetable::of(&self.job, &self.settings()),
+        };
+        Desk::new(terminal, show, times)
     }
 
-    /// What the controller is taken for where a time is estimated.
+    /// What the controller is taken for where a job is timed or rehearsed.
     fn settings(&self) -> Settings {
         let mut settings = self
             .machine
@@ -181,7 +185,7 @@ impl Ready {
     }
 
     /// What will happen, in words.
-    fn words(&self, cuts: Option<&Cuts>) -> Vec<String> {
+    fn words(&self, cuts: Option<&Cuts>, time_s: Option<f64>) -> Vec<String> {
         let mut lines = Vec::new();
         let s = self.job.largest_s();
         let power = match self.options.s_max {
@@ -203,11 +207,8 @@ impl Ready {
             ),
             None => "will burn nothing".into(),
         });
-        let settings = self.settings();
-        let text = String::from_utf8_lossy(&self.text);
-        let time = estimate(&text, &settings).ok().map(|e| e.time_s);
         let cuts = cuts.map_or_else(String::new, |c| format!("{} cuts, ", c.len()));
-        if let Some(time) = time {
+        if let Some(time) = time_s {
             lines.push(format!(
                 "{cuts}about {} min {} s on {}",
                 short((time / 60.0).floor(), 0),
@@ -221,12 +222,12 @@ impl Ready {
     }
 
     /// Whether the person at the terminal wants it. Without one there is nobody to ask, and the call itself was the order.
-    fn agreed(&self, cuts: Option<&Cuts>, terminal: &Terminal) -> bool {
+    fn agreed(&self, cuts: Option<&Cuts>, desk: &Desk<'_>, terminal: &Terminal) -> bool {
         if !(std::io::stdin().is_terminal() && std::io::stderr().is_terminal()) {
             return true;
         }
         terminal.clear();
-        for line in self.words(cuts) {
+        for line in self.words(cuts, desk.whole_s()) {
             terminal.note(&line);
         }
         agrees(
@@ -351,10 +352,10 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
             None
         }
     };
-    if !args.yes && !ready.agreed(cuts.as_ref(), terminal) {
+    let desk = ready.desk(global, terminal);
+    if !args.yes && !ready.agreed(cuts.as_ref(), &desk, terminal) {
         return Err(Failure::No("nothing was sent".into()));
     }
-    let desk = ready.desk(global, terminal);
     let report = ready.at_port(terminal, |port| {
         if args.check {
             Console::open(port, terminal)
@@ -409,17 +410,14 @@ fn rehearsal(
     global: &Global,
     terminal: &Terminal,
 ) -> Result<(), Failure> {
-    let mut settings = ready
-        .machine
-        .as_ref()
-        .map_or_else(Settings::default, Settings::of_machine);
-    if let Some(s_max) = ready.options.s_max {
-        settings.s_max = s_max;
-    }
     let rehearsal =
-        rehearse(&ready.text, &settings, &ready.rules, terminal).map_err(|error| match error {
-            RehearsalError::Job(error) => Failure::Bad(format!("{}: {error}", what.job.display())),
-            RehearsalError::Send(error) => failure(*error),
+        rehearse(&ready.text, &ready.settings(), &ready.rules, terminal).map_err(|error| {
+            match error {
+                RehearsalError::Job(error) => {
+                    Failure::Bad(format!("{}: {error}", what.job.display()))
+                }
+                RehearsalError::Send(error) => failure(*error),
+            }
         })?;
     terminal.clear();
     print(global, &rehearsal.report, Some(&rehearsal.summary));

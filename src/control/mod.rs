@@ -50,3 +50,4 @@ pub use serial::{PortError, SerialTransport, ports};
 pub use survey::{JobReach, Survey};
 pub use tcp::TcpTransport;
 pub use transport::Transport;
+pub(crate) use transport::received;

@@ -32,7 +32,7 @@ pub trait Transport {
 ///
 /// # Errors
 /// All other errors, and `lost` where the far side has gone.
-pub(super) fn received(read: io::Result<usize>, lost: io::ErrorKind) -> io::Result<usize> {
+pub(crate) fn received(read: io::Result<usize>, lost: io::ErrorKind) -> io::Result<usize> {
     match read {
         // Nothing to read and no timeout: the far side has gone.
         Ok(0) => Err(lost.into()),

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::controller::Controller;
 use super::serve::{Heard, Port, Serve, WAIT, run};
+use crate::control::received;
 
 /// Why the machine cannot be served on TCP.
 #[derive(Debug, thiserror::Error)]
@@ -91,19 +92,9 @@ impl Port for TcpServer {
         let Some(client) = &mut self.client else {
             return Heard::Nobody;
         };
-        match client.read(buffer) {
-            Ok(count) if count > 0 => Heard::Bytes(count),
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    io::ErrorKind::TimedOut
-                        | io::ErrorKind::WouldBlock
-                        | io::ErrorKind::Interrupted
-                ) =>
-            {
-                Heard::Bytes(0)
-            }
-            _ => {
+        match received(client.read(buffer), io::ErrorKind::ConnectionAborted) {
+            Ok(count) => Heard::Bytes(count),
+            Err(_) => {
                 self.client = None;
                 Heard::Nobody
             }
