@@ -465,6 +465,8 @@ mod tests {
             offset_mm: None,
             rate_mm_min: None,
             s: Some(500.0),
+            overrides: None,
+            output_on: None,
         };
         let mut glance = Glance {
             status: &status,

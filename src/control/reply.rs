@@ -38,6 +38,12 @@ pub struct Status {
     pub rate_mm_min: Option<f64>,
     /// Power of the output now, S.
     pub s: Option<f64>,
+    /// What the controller makes of feed, rapids and power, per cent, if this report tells it (`Ov:`): every tenth or
+    /// twentieth does, and the one after a change.
+    pub overrides: Option<[u16; 3]>,
+    /// Whether the spindle output (the laser, the torch) is switched on, if this report tells it: `A:` lists what is on,
+    /// and comes with `Ov:`, so where that comes alone nothing is.
+    pub output_on: Option<bool>,
 }
 
 impl Status {
@@ -89,6 +95,8 @@ impl Status {
             offset_mm: None,
             rate_mm_min: None,
             s: None,
+            overrides: None,
+            output_on: None,
         };
         for field in fields {
             let (name, values) = field.split_once(':')?;
@@ -104,6 +112,17 @@ impl Status {
                     // grblHAL adds a third figure.
                     status.s = Some(s.split(',').next()?.parse().ok()?);
                 }
+                "Ov" => {
+                    let mut list = values.split(',').map(str::parse::<u16>);
+                    let mut percent = [0; 3];
+                    for p in &mut percent {
+                        *p = list.next()?.ok()?;
+                    }
+                    status.overrides = Some(percent);
+                    status.output_on = status.output_on.or(Some(false));
+                }
+                // S: clockwise (M3), C: counterclockwise (M4).
+                "A" => status.output_on = Some(values.contains(['S', 'C'])),
                 _ => {}
             }
         }
@@ -222,10 +241,34 @@ mod tests {
     }
 
     #[test]
+    fn what_is_switched_on_is_told_with_the_overrides() {
+        let told = |text: &str| match Reply::parse(text) {
+            Some(Reply::Status(status)) => (status.overrides, status.output_on),
+            other => panic!("{other:?}"),
+        };
+        for (rest, overrides, output_on) in [
+            ("", None, None),
+            ("|WCO:0,0,0", None, None),
+            ("|Ov:90,25,110|A:S", Some([90, 25, 110]), Some(true)),
+            ("|Ov:100,100,100|A:CF", Some([100; 3]), Some(true)),
+            ("|Ov:100,100,100|A:FM", Some([100; 3]), Some(false)),
+            ("|A:S|Ov:100,100,100", Some([100; 3]), Some(true)),
+            ("|Ov:100,100,100", Some([100; 3]), Some(false)),
+            // grblHAL tells a change of these alone, also that nothing is on any more.
+            ("|A:", None, Some(false)),
+            ("|A:S", None, Some(true)),
+        ] {
+            let text = format!("<Hold:0|MPos:0.000,0.000,0.000|FS:0,0{rest}>");
+            assert_eq!(told(&text), (overrides, output_on), "{text}");
+        }
+    }
+
+    #[test]
     fn a_damaged_line_proves_nothing() {
         for text in [
             "<Idle|FS:0,0",
             "<Idle|FS:0>",
+            "<Idle|FS:0,0|Ov:100,1>",
             "<Idle|MPos:1,2|FS:0,0>",
             "oj",
             "<Idlf|FS:0,0>",
