@@ -19,6 +19,7 @@ mod port_args;
 pub mod ports;
 pub mod pose;
 mod profiles;
+mod question;
 pub mod resume;
 mod samples;
 pub mod send;

@@ -9,7 +9,7 @@ use super::cut::drawing_of;
 use super::desk::{Desk, Show, Timetable};
 use super::port_args::{self, SIM, port_of, remember};
 use super::profiles::{machine_named, own_folder};
-use super::terminal::agrees;
+use super::question::agrees;
 use super::{Failure, Global, Terminal};
 use crate::base::progress::Progress as _;
 use crate::base::units::short;
