@@ -29,6 +29,7 @@ pub mod states;
 pub mod surface_args;
 pub mod template;
 mod terminal;
+mod timetable;
 pub mod verify;
 
 use std::ffi::OsString;
