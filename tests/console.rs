@@ -190,7 +190,10 @@ fn a_job_that_would_leave_the_travel_is_not_begun() {
     let mut profile = kagome::machine::load("co2-600x400").unwrap();
     profile.motion.rate_mm_per_min.x = 1234.0;
     let options = SendOptions {
-        made_for: Some(Box::new((profile, JobReach::of(text)))),
+        made_for: Some(Box::new((
+            profile,
+            JobReach::of(text, kagome::gcode::Dialect::Laser),
+        ))),
         ..SendOptions::default()
     };
     let homed = || {

@@ -201,7 +201,7 @@ impl World {
         let zero = self.zero_mm();
         match question {
             Question::Home => true,
-            Question::ZeroHere => {
+            Question::ZeroHere { .. } => {
                 machine.push_head([zero[0] - head[0], zero[1] - head[1], 0.0]);
                 true
             }
@@ -250,7 +250,7 @@ impl World {
                         let now = machine.now_s();
                         machine.advance(now + 20.0);
                     } else {
-                        self.answer(&link, &Question::ZeroHere);
+                        self.answer(&link, &Question::ZeroHere { torch: false });
                     }
                     let mut journal = Journal::new(self.header(), store.clone());
                     send_recorded(

@@ -38,7 +38,7 @@ impl ResumeArgs {
     fn answer(&self, question: &Question, terminal: &Terminal) -> bool {
         let (given, flag) = match question {
             Question::Home => (self.home, "--home"),
-            Question::ZeroHere => (self.zero_here, "--zero-here"),
+            Question::ZeroHere { .. } => (self.zero_here, "--zero-here"),
             Question::AtReference { .. } => (self.at_reference, "--at-reference"),
         };
         if given {

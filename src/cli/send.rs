@@ -190,10 +190,13 @@ impl Ready {
         let mut lines = Vec::new();
         let s = self.job.largest_s();
         let power = match self.options.s_max {
+            _ if self.job.is_torch() => "with the torch".into(),
             Some(s_max) => format!("up to {} % of its power", short(100.0 * s / s_max, 1)),
             None => format!("up to S{}", short(s, 1)),
         };
-        let mode = if self.job.constant_power() {
+        let mode = if self.job.is_torch() {
+            "which stays on if the link is lost: keep a hand on its switch"
+        } else if self.job.constant_power() {
             "CONSTANT (M3): it stays on if the link is lost"
         } else {
             "dynamic (M4): off whenever the head stands"
@@ -278,12 +281,10 @@ pub(super) fn prepare(args: &JobArgs, terminal: &Terminal) -> Result<Ready, Fail
             args.job.display()
         )));
     }
-    let rules = JobRules {
-        allow_constant_power: args.allow_constant_power,
-        line_limit: machine
-            .as_ref()
-            .map_or(JobRules::default().line_limit, Machine::line_limit),
-    };
+    let mut rules = machine
+        .as_ref()
+        .map_or_else(JobRules::default, JobRules::of);
+    rules.allow_constant_power |= args.allow_constant_power;
     if args.s_max.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
         return Err(Failure::Bad("--s-max must be a number above zero".into()));
     }
@@ -309,7 +310,12 @@ pub(super) fn prepare(args: &JobArgs, terminal: &Terminal) -> Result<Ready, Fail
         );
     }
     let connection = machine.as_ref().and_then(|m| m.connection.as_ref());
-    let reach = JobReach::of(&String::from_utf8_lossy(&text));
+    let reach = JobReach::of(
+        &String::from_utf8_lossy(&text),
+        machine
+            .as_ref()
+            .map_or(gcode::Dialect::Laser, gcode::Dialect::of),
+    );
     let options = SendOptions {
         s_max,
         made_for: machine.clone().map(|m| Box::new((m, reach))),

@@ -49,7 +49,12 @@ pub struct Status {
 impl Status {
     /// True if this report proves that the machine stands and its beam is off.
     pub fn dark_and_still(&self) -> bool {
-        let still = matches!(
+        self.is_still() && self.s == Some(0.0)
+    }
+
+    /// True if this report proves that the machine stands.
+    pub fn is_still(&self) -> bool {
+        matches!(
             self.state,
             MachineState::Idle
                 | MachineState::Hold(true)
@@ -57,8 +62,7 @@ impl Status {
                 | MachineState::Alarm
                 | MachineState::Sleep
                 | MachineState::Check
-        );
-        still && self.s == Some(0.0)
+        )
     }
 
     /// The same from a controller that reports in inches (`$13=1`), or in units of so many mm.

@@ -5,7 +5,7 @@
 
 use super::reply::Reply;
 use crate::base::units::short;
-use crate::gcode::read;
+use crate::gcode::{Dialect, read_as};
 use crate::machine::Machine;
 
 /// Lengths of controllers and profiles are the same within so much, mm.
@@ -28,9 +28,9 @@ pub struct JobReach {
 }
 
 impl JobReach {
-    /// Of a job's text; none if it moves nowhere.
-    pub fn of(text: &str) -> Option<Self> {
-        let program = read(text);
+    /// Of a job's text, read by these rules; none if it moves nowhere.
+    pub fn of(text: &str, dialect: Dialect) -> Option<Self> {
+        let program = read_as(text, dialect);
         let mut all: Option<[[f64; 2]; 2]> = None;
         let mut burnt: Option<[[f64; 2]; 2]> = None;
         let mut feed_mm_per_min: f64 = 0.0;
@@ -277,11 +277,11 @@ mod tests {
     #[test]
     fn a_job_outside_of_the_travel_is_refused() {
         let job = "G21 G90\nG0 X10 Y20\nM4 S500\nG1 X110 Y20 F1200\nG1 X110 Y60\nM5\nG0 X0 Y0\n";
-        let reach = JobReach::of(job).unwrap();
+        let reach = JobReach::of(job, Dialect::Laser).unwrap();
         assert_eq!((reach.min_mm, reach.max_mm), ([0.0; 2], [110.0, 60.0]));
         assert_eq!(reach.burnt_mm, Some([[10.0, 20.0], [110.0, 60.0]]));
         assert_eq!(reach.feed_mm_per_min, 1200.0);
-        assert_eq!(JobReach::of("G21\nM5\n"), None);
+        assert_eq!(JobReach::of("G21\nM5\n", Dialect::Laser), None);
         let refused = |options: &str, offset: [f64; 3]| {
             let homes = if options == "hal" { 9 } else { 1 };
             let found = controller(&format!("$22={homes}\n$23=3\n$130=600\n$131=400\n"));

@@ -104,12 +104,12 @@ pub(crate) fn prove(
     );
     progress.check()?;
 
-    let (machine_s, rehearsal) = if machine.controller.is_streamed() && machine.laser().is_some() {
+    let (machine_s, rehearsal) = if machine.controller.is_streamed() {
         let (time_s, summary) =
             rehearsed(&gcode, sheet, machine, setting, &mut objections, progress)?;
         (time_s, Some(summary))
     } else {
-        // The simulated machine is a laser to which a job is streamed.
+        // The simulated machine is one to which a job is streamed.
         (estimated_s(&gcode, machine, setting), None)
     };
     let figures = toolpath.figures();
@@ -134,12 +134,10 @@ fn rehearsed(
     progress: &dyn Progress,
 ) -> Result<(f64, RehearsalSummary), MakeError> {
     progress.start("rehearsing on the simulated machine", None);
-    let rules = JobRules {
-        allow_constant_power: machine
-            .laser()
-            .is_some_and(|l| l.power_mode == PowerMode::Constant),
-        line_limit: machine.line_limit(),
-    };
+    let mut rules = JobRules::of(machine);
+    rules.allow_constant_power |= machine
+        .laser()
+        .is_some_and(|l| l.power_mode == PowerMode::Constant);
     let rehearsal = rehearse(
         gcode.as_bytes(),
         &Settings::of_machine(machine),

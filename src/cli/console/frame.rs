@@ -9,6 +9,7 @@ use crate::cli::port_args::{self, port_of, remember};
 use crate::cli::send::{failure, machine_for};
 use crate::cli::{Failure, Global, Terminal, print, print_json};
 use crate::control::{Job, JobReach, JobRules, SendOptions, Unattended, send};
+use crate::gcode::Dialect;
 
 /// What lights a mark and burns none, per cent of full power, at the most.
 const MOST_PERCENT: f64 = 5.0;
@@ -71,6 +72,11 @@ pub fn run(args: &FrameArgs, global: &Global, terminal: &Terminal) -> Result<(),
     let s = match (args.power > 0.0, s_max) {
         (false, _) => None,
         (true, Some(s_max)) => Some(0.01 * args.power * s_max),
+        (true, None) if machine.as_ref().is_some_and(|m| m.plasma().is_some()) => {
+            return Err(Failure::Bad(
+                "a torch has no faint beam: frame the job dark, without --power".into(),
+            ));
+        }
         (true, None) => {
             return Err(Failure::Bad(
                 "how much power that is depends on the machine: name its profile with --machine"
@@ -78,7 +84,10 @@ pub fn run(args: &FrameArgs, global: &Global, terminal: &Terminal) -> Result<(),
             ));
         }
     };
-    let reach = JobReach::of(&String::from_utf8_lossy(&text));
+    let reach = JobReach::of(
+        &String::from_utf8_lossy(&text),
+        machine.as_ref().map_or(Dialect::Laser, Dialect::of),
+    );
     let Some([low, high]) = reach.and_then(|r| r.burnt_mm) else {
         return Err(Failure::Bad(format!(
             "{} burns nothing: there is nothing to frame",
@@ -86,7 +95,13 @@ pub fn run(args: &FrameArgs, global: &Global, terminal: &Terminal) -> Result<(),
         )));
     };
     let job = around(low, high, s, args.feed, args.times);
-    let job = Job::check(job.as_bytes(), &JobRules::default()).map_err(Failure::bad)?;
+    let job = Job::check(
+        job.as_bytes(),
+        &machine
+            .as_ref()
+            .map_or_else(JobRules::default, JobRules::of),
+    )
+    .map_err(Failure::bad)?;
     let name = machine.as_ref().map(|m| m.name.as_str());
     let port = port_of(args.port.as_deref(), name)?;
     let options = SendOptions {

@@ -78,6 +78,17 @@ impl<'a> Follower<'a> {
             }
             return Sighting::Beginning;
         }
+        if self.passed.piece == end
+            && let Some(last) = end.checked_sub(1)
+        {
+            // Everything sent is done: it waits where that has ended.
+            let by_mm = distance(self.piece(last).to, at_mm);
+            return if by_mm <= self.tolerance_mm {
+                Sighting::OnTheWay
+            } else {
+                Sighting::Astray { by_mm }
+            };
+        }
         let mut nearest = f64::INFINITY;
         let mut found = None;
         for k in self.passed.piece..end {

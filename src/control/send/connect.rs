@@ -42,6 +42,23 @@ pub(super) struct Facts {
 }
 
 impl Facts {
+    /// How high the head stands, machine coordinates, mm.
+    pub(super) fn height_mm(&self) -> Option<f64> {
+        let status = self.position_mm.as_ref()?;
+        let z = status.position_mm?[2];
+        Some(if status.is_work {
+            z + self.offset_mm[2]
+        } else {
+            z
+        })
+    }
+
+    /// How far it leaves its limit switches when it homes, mm.
+    pub(super) fn pull_off_mm(&self) -> f64 {
+        let way = self.settings.get(&27).copied().unwrap_or(1.0);
+        way.clamp(0.0, 10.0)
+    }
+
     fn setting(&self) -> impl Fn(u32) -> Option<f64> + '_ {
         |number| self.settings.get(&number).copied()
     }
@@ -207,7 +224,13 @@ impl Sender<'_> {
             }
         }
         let setting = |number: u32| settings.get(&number).copied();
-        if setting(32) != Some(1.0) {
+        if self.job.is_torch() && setting(32) != Some(0.0) {
+            return not_ready(
+                "the controller is in laser mode, or does not tell ($32): it would put the torch out on every rapid, also between the pierce and the cut. Set $32=0, then send again"
+                    .into(),
+            );
+        }
+        if !self.job.is_torch() && setting(32) != Some(1.0) {
             return not_ready(
                 "the controller is not in laser mode ($32=1): its beam would stay on between cuts and in a pause. Set $32=1, then send again"
                     .into(),
@@ -252,11 +275,34 @@ impl Sender<'_> {
             settings: settings.clone(),
         };
         self.link.unit_mm = facts.unit_mm;
+        if self.job.is_torch() {
+            self.tells_output()?;
+        }
         if self.cuts.is_some_and(|cuts| !cuts.is_empty()) {
             self.locate(&mut facts)?;
         }
         self.survey_settings(&facts)?;
         Ok(facts)
+    }
+
+    /// Without laser mode a stop is only proven by reports that tell what is switched on: the controller must give them.
+    fn tells_output(&mut self) -> Result<(), SendError> {
+        // GRBL tells in every tenth report at rest.
+        const REPORTS: u32 = 25;
+        for _ in 0..REPORTS {
+            match self.ask_status()?.lit() {
+                Some(false) => return Ok(()),
+                Some(true) => {
+                    return Err(SendError::NotReady {
+                        why: "the machine reports that its output is on already: switch it off (M5), then try again".into(),
+                    });
+                }
+                None => {}
+            }
+        }
+        Err(SendError::NotReady {
+            why: "the controller's reports do not tell what is switched on (A: beside Ov:), so it could not be proven that a stop puts the torch out: switch these reports on ($10 on grblHAL), or use a firmware that has them".into(),
+        })
     }
 
     /// Tells what is set otherwise than the machine's profile says.
