@@ -52,10 +52,7 @@ fn the_head_is_moved_and_told_where_it_is() {
     let status = console.set_zero([Some(5.0), Some(0.0), None]).unwrap();
     assert_eq!(work_mm(&status), Some([5.0, 0.0, 0.0]));
     let told = console.told().unwrap();
-    assert!(
-        told.offsets
-            .contains(&("G54".into(), vec![25.0, 20.0, 0.0]))
-    );
+    assert_eq!(told.offsets.get("G54"), Some(&[25.0, 20.0, 0.0][..]));
     let to = |to: JogTo, x: f64| Move {
         to,
         axes_mm: [Some(x), None, None],

@@ -19,6 +19,7 @@ mod port_args;
 pub mod ports;
 pub mod pose;
 mod profiles;
+mod question;
 pub mod resume;
 mod samples;
 pub mod send;
@@ -28,6 +29,7 @@ pub mod states;
 pub mod surface_args;
 pub mod template;
 mod terminal;
+mod timetable;
 pub mod verify;
 
 use std::ffi::OsString;

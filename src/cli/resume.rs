@@ -5,8 +5,8 @@ use std::io::IsTerminal as _;
 use clap::Args;
 
 use super::port_args::SIM;
+use super::question::agrees;
 use super::send::{JobArgs, prepare, print};
-use super::terminal::agrees;
 use super::{Failure, Global, Terminal};
 use crate::base::progress::Progress as _;
 use crate::control::journal::{self, FileStore, Journal};

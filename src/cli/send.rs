@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::cut::drawing_of;
-use super::desk::{Desk, Show, Timetable};
+use super::desk::{Desk, Show};
 use super::port_args::{self, SIM, port_of, remember};
 use super::profiles::{machine_named, own_folder};
-use super::terminal::agrees;
+use super::question::agrees;
+use super::timetable::Timetable;
 use super::{Failure, Global, Terminal};
 use crate::base::progress::Progress as _;
 use crate::base::units::short;

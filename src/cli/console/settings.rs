@@ -9,7 +9,7 @@ use super::at_machine;
 use crate::base::atomic::write_file;
 use crate::base::progress::Progress as _;
 use crate::cli::port_args::PortArgs;
-use crate::cli::terminal::agrees;
+use crate::cli::question::agrees;
 use crate::cli::{Failure, Global, Terminal, print, print_json};
 use crate::control::{ControllerSettings, SettingDifference};
 

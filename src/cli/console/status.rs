@@ -51,7 +51,7 @@ pub fn run(args: &StatusArgs, global: &Global, terminal: &Terminal) -> Result<()
         });
     }
     lines.push(format!("modes {}", told.modes));
-    for (name, values) in &told.offsets {
+    for (name, values) in told.offsets.iter() {
         if values.iter().any(|v| *v != 0.0) {
             let values: Vec<String> = values.iter().map(ToString::to_string).collect();
             lines.push(format!("{name} {}", values.join(" ")));
