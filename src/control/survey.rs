@@ -307,7 +307,7 @@ mod tests {
     #[test]
     fn fluidnc_has_each_axis_where_its_file_says() {
         let job = "G21 G90\nG0 X10 Y20\nM4 S500\nG1 X110 Y60 F1200\nM5\n";
-        let reach = JobReach::of(job).unwrap();
+        let reach = JobReach::of(job, Dialect::Laser).unwrap();
         let file = |axis: &str, cycle: &str, positive: &str, mpos: &str, travel: &str| {
             let key = |key: &str, value: &str| format!("$/axes/{axis}/{key}={value}");
             [
