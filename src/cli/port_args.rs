@@ -89,7 +89,8 @@ pub(super) fn open(
 ) -> Result<Box<dyn Transport>, Failure> {
     if port == SIM {
         let settings = machine.map_or_else(Settings::default, Settings::of_machine);
-        return Ok(Box::new(SimTransport::new(Controller::new(settings))));
+        let controller = Controller::homed_at_zero(settings);
+        return Ok(Box::new(SimTransport::new(controller)));
     }
     let connection = machine.and_then(|m| m.connection.as_ref());
     let baud = baud.or(connection.map(|c| c.baud)).unwrap_or(STANDARD_BAUD);
