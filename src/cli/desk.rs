@@ -415,6 +415,7 @@ mod tests {
         Status {
             state: MachineState::Run,
             position_mm: Some([10.0, 5.0, 0.0]),
+            rounding_mm: 0.0005,
             is_work: false,
             offset_mm: None,
             rate_mm_min: None,

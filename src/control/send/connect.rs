@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::reason::error_words;
 use super::{ANSWER, RESET, SendError, Sender};
+use crate::base::units::short;
 use crate::control::reply::{MachineState, Reply, Status, triple};
 use crate::control::stranger;
 use crate::control::survey::Survey;
@@ -13,6 +14,9 @@ use crate::machine;
 
 /// The largest receive buffer believed, bytes: what grblHAL and FluidNC boards tell at the most.
 const LARGEST_BUFFER: usize = 1024;
+
+/// The coarsest reports by which a job can be followed, mm: less than makes a head astray.
+const COARSEST_MM: f64 = 2.0 * super::prove::ASTRAY_MM;
 
 /// What was heard before anything was.
 pub(super) const NOTHING: &str = "nothing was heard";
@@ -64,17 +68,16 @@ impl Facts {
     }
 }
 
-/// How far a report may be from where the job says the head is: half of the last decimal in each axis, an end rounded to
+/// How far a report may be from where the job says the head is, but for the rounding of the report: an end rounded to
 /// steps and the head a step off the straight line, and the chords of arcs, the controller's and ours.
 fn tolerance_mm(setting: &dyn Fn(u32) -> Option<f64>) -> f64 {
     // Boards that do not tell their steps are taken for coarse ones.
     const COARSE: f64 = 20.0;
-    const DECIMALS_MM: f64 = 0.0013;
     const CHORDS_MM: f64 = 0.004;
     const SLACK_MM: f64 = 0.01;
     let step = |number| 1.0 / setting(number).filter(|v| *v > 0.0).unwrap_or(COARSE);
     let arc = setting(12).unwrap_or(0.002).clamp(0.0, 1.0);
-    1.5 * step(100).hypot(step(101)) + arc + DECIMALS_MM + CHORDS_MM + SLACK_MM
+    1.5 * step(100).hypot(step(101)) + arc + CHORDS_MM + SLACK_MM
 }
 
 impl Sender<'_> {
@@ -355,7 +358,20 @@ impl Sender<'_> {
             }
         }
         facts.offset_mm = offset_mm;
-        facts.position_mm = Some(self.ask_status()?);
+        let status = self.ask_status()?;
+        // Both axes together; and the offset, which is told with as many decimals, where the position is the machine's.
+        let rounding_mm = 2.0 * std::f64::consts::SQRT_2 * status.rounding_mm;
+        if rounding_mm > COARSEST_MM {
+            return Err(SendError::NotReady {
+                why: format!(
+                    "the controller tells its position in steps of {} mm, so nobody can say which cuts are made: let it report millimetres ($13=0), or send the job with --no-journal",
+                    short(2.0 * status.rounding_mm, 2)
+                ),
+            });
+        }
+        let exact_mm = tolerance_mm(&facts.setting());
+        facts.tolerance_mm = exact_mm + rounding_mm;
+        facts.position_mm = Some(status);
         Ok(())
     }
 

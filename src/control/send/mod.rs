@@ -131,6 +131,10 @@ struct Sender<'a> {
     allowed: usize,
     /// Reports in a row that showed the head astray.
     astray: u32,
+    /// How much speaks for reports that are coarser than they look.
+    doubt: f64,
+    /// They are taken for that.
+    coarse: bool,
     /// Over the output of a torch that is held.
     watch: Watch,
     /// The last work offset told, mm.
@@ -176,6 +180,8 @@ impl<'a> Sender<'a> {
             proven: 0,
             allowed: usize::MAX,
             astray: 0,
+            doubt: 0.0,
+            coarse: false,
             watch: Watch::default(),
             offset_mm: [0.0; 3],
             started: Duration::ZERO,
