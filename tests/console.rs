@@ -8,8 +8,10 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use kagome::base::progress::{Progress, Silent};
 use kagome::control::{
     Console, ConsoleError, ControllerSettings, Job, JobReach, JobRules, JogTo, MachineState, Move,
-    SendOptions, Transport as _, send, work_mm,
+    SendOptions, Survey, Transport as _, send, work_mm,
 };
+use kagome::gcode::Dialect;
+use kagome::machine::Origin;
 use kagome::sim::{Controller, Settings, SimTransport};
 
 /// Interrupts when it has been asked so often.
@@ -190,10 +192,7 @@ fn a_job_that_would_leave_the_travel_is_not_begun() {
     let mut profile = kagome::machine::load("co2-600x400").unwrap();
     profile.motion.rate_mm_per_min.x = 1234.0;
     let options = SendOptions {
-        made_for: Some(Box::new((
-            profile,
-            JobReach::of(text, kagome::gcode::Dialect::Laser),
-        ))),
+        made_for: Some(Box::new((profile, JobReach::of(text, Dialect::Laser)))),
         ..SendOptions::default()
     };
     let homed = || {
@@ -260,6 +259,90 @@ fn silence_and_strangers_are_told_by_name() {
 }
 
 #[test]
+fn the_machine_that_is_built_in_is_set_as_its_profile_says() {
+    let mut seen = 0;
+    for (name, _) in kagome::machine::shipped() {
+        let profile = kagome::machine::load(name).unwrap();
+        if !profile.controller.is_streamed() {
+            continue;
+        }
+        let output = Command::new(env!("CARGO_BIN_EXE_kagome"))
+            .env("KAGOME_PROFILES", "")
+            .args(["status", "--port", "sim", "--json", "--machine", name])
+            .output()
+            .unwrap();
+        let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(told["differs"], serde_json::json!([]), "{name}");
+        assert_eq!(told["state"], "Idle", "{name}");
+        assert_eq!(told["work_mm"], serde_json::json!([0.0, 0.0, 0.0]));
+        seen += 1;
+    }
+    assert!(seen > 4, "{seen}");
+}
+
+#[test]
+fn a_homed_machine_counts_as_its_profile_does_and_keeps_to_its_travel() {
+    for (name, _) in kagome::machine::shipped() {
+        let mut profile = kagome::machine::load(name).unwrap();
+        if !(profile.controller.is_streamed() && profile.homing.enabled) {
+            continue;
+        }
+        for origin in [
+            Origin::FrontLeft,
+            Origin::FrontRight,
+            Origin::RearLeft,
+            Origin::RearRight,
+        ] {
+            profile.bed.origin = origin;
+            let reach = profile.reach();
+            let mut line = machine(Settings::of_machine(&profile));
+            let mut console = Console::open(&mut line, &Silent).unwrap();
+            assert_eq!(console.first.state, MachineState::Alarm);
+            let status = console.home().unwrap();
+            assert_eq!(work_mm(&status), Some([0.0; 3]));
+            let mut to = |x: f64, y: f64| {
+                console.jog(&Move {
+                    to: JogTo::Work,
+                    axes_mm: [Some(x), Some(y), None],
+                    feed_mm_per_min: 6000.0,
+                })
+            };
+            for (x, y) in [reach.min, reach.max].map(<(f64, f64)>::from) {
+                let status = to(x, y).unwrap();
+                assert_eq!(work_mm(&status), Some([x, y, 0.0]), "{name} {origin:?}");
+            }
+            for (x, y) in [(reach.min[0] - 0.1, 0.0), (0.0, reach.max[1] + 0.1)] {
+                assert!(to(x, y).is_err(), "{name} {origin:?}");
+            }
+            dark(&line);
+        }
+    }
+}
+
+#[test]
+fn the_travel_of_fluidnc_is_known_from_its_file() {
+    let profile = kagome::machine::load("diode-400-fluidnc").unwrap();
+    let mut line = machine(Settings::of_machine(&profile));
+    let mut console = Console::open(&mut line, &Silent).unwrap();
+    console.home().unwrap();
+    let mut replies = Vec::new();
+    for question in Survey::TRAVEL_OF_FILE {
+        replies.extend(console.ask(question).unwrap());
+    }
+    let job = "G21 G90\nM4 S500\nG0 X10 Y10\nG1 X390 Y390 F1200\nM5\n";
+    let reach = JobReach::of(job, Dialect::Laser).unwrap();
+    let refused = |x_mm: f64| {
+        let mut survey = Survey::default();
+        survey.travel_of_file(&replies, &reach, [x_mm, 0.0, 0.0]);
+        survey.refused.len()
+    };
+    assert_eq!(
+        [-11.0, -10.0, 0.0, 10.0, 11.0].map(refused),
+        [1, 0, 0, 0, 1]
+    );
+}
+
+#[test]
 fn the_verbs_say_what_they_did() {
     let folder = tempfile::tempdir().unwrap();
     let run = |line: &str| {
@@ -282,7 +365,8 @@ fn the_verbs_say_what_they_did() {
     std::fs::write(folder.path().join("empty.nc"), "G21\nM2\n").unwrap();
     for (code, line, words) in [
         (0, "status --port sim", "the beam is off"),
-        (0, "jog --port sim --x 12.5 --y -3", "X12.500 Y-3.000"),
+        (0, "jog --port sim --x 12.5 --y 3", "X12.500 Y3.000"),
+        (1, "jog --port sim --x 12.5 --y -3", "$131"),
         (0, "zero --port sim", "zero is set"),
         (0, "frame job.nc --port sim", "X10 Y20 to X60 Y50, dark"),
         (
@@ -297,7 +381,8 @@ fn the_verbs_say_what_they_did() {
             "would mark",
         ),
         (2, "frame empty.nc --port sim", "nothing to frame"),
-        (1, "home --port sim", "$22=0"),
+        (0, "home --port sim", "homed"),
+        (1, "home --port sim --machine diode-400", "$22=0"),
         (2, "jog --port sim", "name an axis"),
         (2, "status", "--port"),
         (
@@ -318,7 +403,7 @@ fn the_verbs_say_what_they_did() {
         (
             0,
             "settings restore a.txt --port sim --machine diode-400 --yes",
-            "4 setting(s) written",
+            "7 setting(s) written",
         ),
         (2, "settings restore job.nc --port sim --yes", "job.nc:2"),
     ] {

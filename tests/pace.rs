@@ -20,7 +20,7 @@ fn checked(text: &str) -> Job {
 
 /// Seconds that a job takes with at most so many unconfirmed cuts; without a limit if none.
 fn time_s(job: &Job, settings: &Settings, ahead: Option<usize>) -> f64 {
-    let mut link = SimTransport::new(Controller::new(settings.clone()));
+    let mut link = SimTransport::new(Controller::homed_at_zero(settings.clone()));
     let options = SendOptions {
         buffer: Some(settings.receive_buffer),
         ..SendOptions::default()

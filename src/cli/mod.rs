@@ -11,6 +11,7 @@ pub mod flatten;
 pub mod form;
 pub mod inspect;
 mod inspect_linkage;
+mod job_args;
 pub mod layout_args;
 pub mod machines;
 pub mod make;

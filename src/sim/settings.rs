@@ -32,6 +32,10 @@ pub struct Settings {
     pub homing: bool,
     /// `$23`: bit k set: axis k homes towards its negative end.
     pub homing_direction_mask: f64,
+    /// Where homing has put the head is machine zero, and an axis that homes towards its negative end goes from 0 to its
+    /// travel. GRBL is built so (`Z` of `$I`), grblHAL has bit 3 of `$22` for it, FluidNC `mpos_mm: 0` in its file. Else
+    /// every axis goes from −travel to 0.
+    pub homing_sets_zero: bool,
     /// `$24`: slow homing rate, mm/min (kept and reported, without effect here).
     pub homing_feed_mm_min: f64,
     /// `$25`: homing rate, mm/min.
@@ -79,6 +83,7 @@ impl Default for Settings {
             hard_limits: false,
             homing: false,
             homing_direction_mask: 0.0,
+            homing_sets_zero: false,
             homing_feed_mm_min: 25.0,
             homing_seek_mm_min: 500.0,
             homing_debounce_ms: 250.0,
@@ -149,6 +154,14 @@ impl Settings {
             settings.planner_blocks = connection.planner_blocks as usize;
             settings.baud = Some(f64::from(connection.baud));
         }
+        if machine.homing.enabled {
+            // To the corner that is zero in the profile, so that a homed machine counts as its jobs do.
+            let [x, y] = machine.reach().min.map(|low| u8::from(low == 0.0));
+            settings.homing = true;
+            settings.soft_limits = true;
+            settings.homing_sets_zero = true;
+            settings.homing_direction_mask = f64::from(x + 2 * y);
+        }
         settings
     }
 
@@ -178,6 +191,28 @@ impl Settings {
         }
     }
 
+    /// `$22`.
+    fn homing_flags(&self) -> f64 {
+        let sets_zero = self.homing_sets_zero && self.flavour == Flavour::GrblHal;
+        f64::from(u8::from(self.homing) + 8 * u8::from(self.homing && sets_zero))
+    }
+
+    /// The ends of an axis in machine coordinates, mm, once it is homed.
+    pub(crate) fn range_mm(&self, axis: usize) -> [f64; 2] {
+        let travel = self.travel_mm[axis];
+        if self.homing_sets_zero && self.homes_downwards(axis) {
+            [0.0, travel]
+        } else {
+            [-travel, 0.0]
+        }
+    }
+
+    /// An axis homes towards its negative end.
+    pub(crate) fn homes_downwards(&self, axis: usize) -> bool {
+        // A mask of 3 bits: the cast keeps it.
+        self.homing_direction_mask as u8 & (1 << axis) != 0
+    }
+
     /// The settings as `$$` lists them.
     pub(crate) fn rows(&self) -> Vec<Row> {
         let flag = |b: bool| f64::from(u8::from(b));
@@ -190,7 +225,7 @@ impl Settings {
             (13, flag(self.report_inches), 0),
             (20, flag(self.soft_limits), 0),
             (21, flag(self.hard_limits), 0),
-            (22, flag(self.homing), 0),
+            (22, self.homing_flags(), 0),
             (23, self.homing_direction_mask, 0),
             (24, self.homing_feed_mm_min, 3),
             (25, self.homing_seek_mm_min, 3),
@@ -268,6 +303,9 @@ impl Settings {
             22 => {
                 self.homing = on;
                 self.soft_limits &= on;
+                if self.flavour == Flavour::GrblHal {
+                    self.homing_sets_zero = value as u32 & 8 != 0;
+                }
             }
             23 => self.homing_direction_mask = value.trunc(),
             25 => self.homing_seek_mm_min = value.max(1.0),
