@@ -252,6 +252,7 @@ fn paused(
     let options = SendOptions {
         buffer: Some(128),
         poll: Duration::from_millis(50),
+        longest_pause: Some(Duration::from_secs(60)),
         ..SendOptions::default()
     };
     let result = send(&mut line, &job(), &options, &pauses);
@@ -284,8 +285,14 @@ fn a_torch_that_is_held_goes_dark_and_on_where_it_was() {
                     lengths.iter().all(|l| (l - LENGTH_MM).abs() < 0.05),
                     "{lengths:?}"
                 );
+                // grblHAL gives the torch time before it goes on, as the sender's warning says.
+                let run_up_s = if flavour == Flavour::GrblHal {
+                    4.1
+                } else {
+                    0.0
+                };
                 assert!(
-                    standing < PIERCE_AT_MOST_S.max(HELD_AT_MOST_S),
+                    standing < PIERCE_AT_MOST_S.max(HELD_AT_MOST_S).max(run_up_s),
                     "{standing}"
                 );
             }
