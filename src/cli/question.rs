@@ -39,9 +39,6 @@ impl<'a> TypedLines<'a> {
 
     /// The next line; empty at the end.
     fn wait(&self) -> io::Result<Vec<u8>> {
-        if self.terminal.interrupted() {
-            return Ok(Vec::new());
-        }
         // A thread a line, so that nothing reads on once the last question is answered. One that is left waiting ends with
         // the program, which a wish to stop brings about.
         let (answer, answered) = mpsc::channel();
@@ -51,10 +48,13 @@ impl<'a> TypedLines<'a> {
             let _ = answer.send(read.map(|_| line));
         })?;
         let line = loop {
+            if self.terminal.interrupted() {
+                break Vec::new();
+            }
             match answered.recv_timeout(LOOK) {
                 Ok(line) => break line?,
-                Err(RecvTimeoutError::Timeout) if !self.terminal.interrupted() => {}
-                Err(_) => break Vec::new(),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break Vec::new(),
             }
         };
         if !line.ends_with(b"\n") {

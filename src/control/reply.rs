@@ -140,7 +140,7 @@ impl Status {
 }
 
 /// The first three of a list of numbers; machines with more axes tell more.
-pub(super) fn triple(text: &str) -> Option<[f64; 3]> {
+fn triple(text: &str) -> Option<[f64; 3]> {
     let mut list = text.split(',').map(str::parse::<f64>);
     let mut place = [0.0; 3];
     for p in &mut place {

@@ -15,7 +15,7 @@ pub struct Burn {
     pub end_s: f64,
     /// The S word in force.
     pub s: f64,
-    /// True if the power followed the speed (M4), false if it was constant.
+    /// True if the power followed the speed (M4 in laser mode), false if it was constant.
     pub dynamic: bool,
     /// True if the move was a rapid: a beam there is always a fault.
     pub rapid: bool,
@@ -159,6 +159,8 @@ pub struct BeamTime {
 pub(crate) struct Light {
     pub s: f64,
     pub spindle: Spindle,
+    /// The power follows the speed.
+    pub dynamic: bool,
     pub rapid: bool,
 }
 
@@ -166,6 +168,7 @@ impl Light {
     pub const DARK: Self = Self {
         s: 0.0,
         spindle: Spindle::Off,
+        dynamic: false,
         rapid: false,
     };
 
@@ -193,7 +196,7 @@ impl Bed {
                 start_s: now_s,
                 end_s: now_s,
                 s: light.s,
-                dynamic: light.spindle == Spindle::Dynamic,
+                dynamic: light.dynamic,
                 rapid: light.rapid,
             });
         }
@@ -312,6 +315,7 @@ mod tests {
         let light = Light {
             s: 300.0,
             spindle: Spindle::Constant,
+            dynamic: false,
             rapid: false,
         };
         bed.light(1.0, [2.0, 3.0, 0.0], light);

@@ -88,6 +88,7 @@ pub fn estimate(job: &str, settings: &Settings) -> Result<Estimate, EstimateErro
                 Action::Sync | Action::Pause | Action::End => 0.0,
                 Action::Dwell { left_s, .. } => left_s,
                 Action::Spindle { .. }
+                | Action::Air(_)
                 | Action::Memory
                 | Action::Home
                 | Action::Jog { .. }

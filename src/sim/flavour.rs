@@ -56,6 +56,21 @@ impl Flavour {
         }
     }
 
+    /// How long the spindle and the air get to come back behind a closed door, s; grblHAL gives the spindle that time
+    /// also where 0x9E has stopped it. FluidNC leaves it to the spindle.
+    pub(crate) fn door_delays_s(self) -> [f64; 2] {
+        match self {
+            Self::Grbl | Self::GrblHal => [4.0, 1.0],
+            Self::FluidNc => [0.0; 2],
+        }
+    }
+
+    /// Whether a report tells what is switched on whenever that has changed, and also that it is nothing, instead of
+    /// together with the overrides.
+    pub(crate) fn tells_accessories_apart(self) -> bool {
+        self == Self::GrblHal
+    }
+
     /// What makes its steps, where that is known: 16 MHz for GRBL's 8-bit boards.
     pub(crate) fn step_timer(self) -> Option<StepTimer> {
         match self {

@@ -7,7 +7,8 @@ use std::time::Duration;
 use super::reason::error_words;
 use super::{ANSWER, RESET, SendError, Sender};
 use crate::base::units::short;
-use crate::control::reply::{MachineState, Reply, Status, triple};
+use crate::control::offsets::Offsets;
+use crate::control::reply::{MachineState, Reply, Status};
 use crate::control::stranger;
 use crate::control::survey::Survey;
 use crate::machine;
@@ -158,6 +159,17 @@ impl Sender<'_> {
 
     /// Sends a question and collects what is said until `ok`.
     pub(super) fn ask(&mut self, question: &str) -> Result<Vec<Reply>, SendError> {
+        self.try_ask(question)?
+            .map_err(|number| SendError::NotReady {
+                why: format!(
+                    "the controller answers {question} with error {number}: {}",
+                    error_words(number)
+                ),
+            })
+    }
+
+    /// The same; the inner error is the number of the controller's.
+    fn try_ask(&mut self, question: &str) -> Result<Result<Vec<Reply>, u32>, SendError> {
         let lost = |port: String, source| SendError::Connect { port, source };
         let text = format!("{question}\n");
         self.link
@@ -172,15 +184,8 @@ impl Sender<'_> {
                 .reply_before(deadline)
                 .map_err(|source| lost(self.port(), source))?
             {
-                Some(Reply::Ok) => return Ok(answer),
-                Some(Reply::Error(number)) => {
-                    return Err(SendError::NotReady {
-                        why: format!(
-                            "the controller answers {question} with error {number}: {}",
-                            error_words(number)
-                        ),
-                    });
-                }
+                Some(Reply::Ok) => return Ok(Ok(answer)),
+                Some(Reply::Error(number)) => return Ok(Err(number)),
                 Some(reply) => answer.push(reply),
                 None => {
                     return Err(SendError::NoController {
@@ -317,16 +322,25 @@ impl Sender<'_> {
     }
 
     /// Refuses a job that would leave the travel from where its zero point lies.
-    pub(super) fn survey_travel(&self, facts: &Facts) -> Result<(), SendError> {
-        let Some((machine, Some(reach))) = self.options.made_for.as_deref() else {
+    pub(super) fn survey_travel(&mut self, facts: &Facts) -> Result<(), SendError> {
+        let options = self.options;
+        let Some((machine, Some(reach))) = options.made_for.as_deref() else {
             return Ok(());
         };
-        // FluidNC has each axis's range in a file of its own.
-        if machine.controller == machine::Controller::FluidNc || facts.position_mm.is_none() {
+        if facts.position_mm.is_none() {
             return Ok(());
         }
         let mut survey = Survey::default();
-        survey.travel(&facts.setting(), &facts.letters, reach, facts.offset_mm);
+        if machine.controller == machine::Controller::FluidNc {
+            let mut told = Vec::new();
+            for key in Survey::TRAVEL_OF_FILE {
+                // A version that does not know a key refuses it.
+                told.extend(self.try_ask(key)?.unwrap_or_default());
+            }
+            survey.travel_of_file(&told, reach, facts.offset_mm);
+        } else {
+            survey.travel(&facts.setting(), &facts.letters, reach, facts.offset_mm);
+        }
         self.judge(&survey)
     }
 
@@ -342,22 +356,16 @@ impl Sender<'_> {
 
     /// Where the job's zero point lies, and where the head stands.
     pub(super) fn locate(&mut self, facts: &mut Facts) -> Result<(), SendError> {
-        let mut offset_mm = [0.0; 3];
-        for reply in self.ask("$#")? {
-            if let Reply::Message(text) = reply
-                && let Some((name, values)) = text
-                    .trim_start_matches('[')
-                    .trim_end_matches(']')
-                    .split_once(':')
-                && (name == facts.system || name == "G92")
-                && let Some(values) = triple(values)
-            {
-                for (sum, value) in offset_mm.iter_mut().zip(values) {
-                    *sum += value * facts.unit_mm;
-                }
-            }
-        }
-        facts.offset_mm = offset_mm;
+        let told = Offsets::of(&self.ask("$#")?);
+        let Some(zero) = told.zero(&facts.system) else {
+            return Err(SendError::NotReady {
+                why: format!(
+                    "the controller does not tell where the job's zero point lies ({} in $#): try again",
+                    facts.system
+                ),
+            });
+        };
+        facts.offset_mm = zero.map(|v| v * facts.unit_mm);
         let status = self.ask_status()?;
         // Both axes together; and the offset, which is told with as many decimals, where the position is the machine's.
         let rounding_mm = 2.0 * std::f64::consts::SQRT_2 * status.rounding_mm;

@@ -8,13 +8,14 @@
 //!
 //! Not simulated: probing, spindle synchronisation, parking, the motion of homing (the head is there after its time).
 
+mod hold;
 mod limits;
 mod motion;
 mod overrides;
 mod power;
 mod program;
-mod realtime;
 mod report;
+mod reset;
 mod system;
 #[cfg(test)]
 mod tests;
@@ -24,10 +25,11 @@ use std::collections::VecDeque;
 
 use super::burnt::{BeamChange, BeamTime, Bed, Burn, Light};
 use super::faults::Mishap;
-use super::modal::{Action, Drive, Modal};
+use super::modal::{Action, Drive, Modal, Spindle};
 use super::settings::Settings;
 use crate::planner::{Profile, Queue};
 
+use hold::{Restore, Stop};
 use overrides::Overrides;
 
 pub use power::Life;
@@ -154,18 +156,28 @@ pub struct Controller {
     soft_limit_hit: bool,
     /// A jog is being cancelled.
     jog_cancelled: bool,
-    /// 0x9E came before the head stood.
-    stop_output: bool,
+    /// What became of 0x9E.
+    stop: Stop,
+    /// What a hold puts back at its end.
+    restore: Restore,
     held_since_s: f64,
-    /// When the output has come back behind a closed door.
-    restored_s: f64,
+    /// When the output has had its time to come back, and the head moves on.
+    resume_s: Option<f64>,
+    /// Air has still to come back.
+    air_waits: bool,
     /// When something moved first and last.
     motion_s: Option<[f64; 2]>,
     // The beam.
     bed: Bed,
     light: Light,
     at_rest: Light,
-    before_hold: Light,
+    /// The last M3, M4 or M5 that was done, not only read, and the S with it.
+    spindle: Spindle,
+    spindle_s: f64,
+    /// Mist and flood, as they are switched.
+    air: [bool; 2],
+    /// What is switched on has changed since it was told.
+    accessory_news: bool,
 }
 
 impl Controller {
@@ -214,14 +226,19 @@ impl Controller {
             zero: [0.0; 3],
             soft_limit_hit: false,
             jog_cancelled: false,
-            stop_output: false,
+            stop: Stop::None,
+            restore: Restore::NOTHING,
             held_since_s: 0.0,
-            restored_s: 0.0,
+            resume_s: None,
+            air_waits: false,
             motion_s: None,
             bed: Bed::default(),
             light: Light::DARK,
             at_rest: Light::DARK,
-            before_hold: Light::DARK,
+            spindle: Spindle::Off,
+            spindle_s: 0.0,
+            air: [false; 2],
+            accessory_news: false,
         };
         new.boot();
         new
@@ -309,6 +326,7 @@ impl Controller {
             || self.answer.is_some()
             || !self.starting.is_empty()
             || self.report_wanted
+            || self.resume_s.is_some()
             || !self.receive.is_empty()
             || self.busy_until_s > self.now_s
     }
@@ -342,10 +360,11 @@ impl Controller {
         if self.busy_until_s > self.now_s {
             next = next.min(self.busy_until_s);
         }
-        if self.state == State::Restoring {
-            next = next.min(self.restored_s.max(self.busy_until_s));
+        if let Some(at) = self.resume_s {
+            next = next.min(at.max(self.busy_until_s));
         }
         if !self.suspended()
+            && self.resume_s.is_none()
             && let Some(Action::Dwell {
                 until_s: Some(until),
                 ..

@@ -54,7 +54,8 @@ impl Controller {
         match self.queue.push(&wanted, cut) {
             Ok(true) if self.overrides != Overrides::default() => self.new_speeds(),
             Ok(true) => {
-                if self.running.is_some() && self.queue.exit_sqr() != exit_before {
+                let changed = self.queue.exit_sqr() != exit_before;
+                if self.running.is_some() && changed && !self.braking() {
                     self.begin_block(now.0);
                 }
             }
@@ -64,6 +65,7 @@ impl Controller {
                 self.actions.push_front(Action::Spindle {
                     spindle: drive.spindle,
                     s: drive.s,
+                    word: self.modal.s,
                 });
                 self.actions.push_front(Action::Sync);
             }
@@ -137,21 +139,27 @@ impl Controller {
         });
     }
 
+    /// The output for these words, with its override and within `$31` and `$30`.
+    pub(super) fn light(&self, spindle: Spindle, s: f64, rapid: bool) -> Light {
+        Light {
+            s: self.output_word(s),
+            spindle,
+            dynamic: self.settings.laser_mode && spindle == Spindle::Dynamic,
+            rapid,
+        }
+    }
+
     /// The beam as the first block wants it.
     pub(super) fn light_block(&mut self) {
         let Some((_, cut)) = self.queue.front() else {
             return;
         };
-        let light = Light {
-            s: self.output_word(cut.drive.s),
-            spindle: cut.drive.spindle,
-            rapid: cut.drive.rate_mm_min.is_none(),
-        };
+        let drive = cut.drive;
+        let light = self.light(drive.spindle, drive.s, drive.rate_mm_min.is_none());
         let head = self.head_mm();
         self.shine(head, light);
         // What the output is left at when the machine comes to rest after this block.
-        let dark = self.settings.laser_mode && light.spindle == Spindle::Dynamic;
-        self.at_rest = if dark {
+        self.at_rest = if light.dynamic {
             Light::DARK
         } else {
             Light {
@@ -195,7 +203,7 @@ impl Controller {
             self.held();
             return;
         }
-        if exit == 0.0 && cut.drive.spindle == Spindle::Dynamic && self.settings.laser_mode {
+        if exit == 0.0 && self.light.dynamic {
             let steps = (0..3).map(|k| {
                 (cut.end[k] - cut.start[k]).abs() / cut.length_mm * self.settings.steps_per_mm[k]
             });

@@ -3,6 +3,7 @@
 use super::{Controller, Cut, State};
 use crate::planner::Block;
 use crate::sim::burnt::Light;
+use crate::sim::modal::Spindle;
 
 /// Percent of what the program says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,9 +70,8 @@ impl Controller {
         if (self.overrides.feed, self.overrides.rapid) != (before.feed, before.rapid) {
             self.new_speeds();
         }
-        // While it stands the output stays as it is until the next motion.
-        if self.overrides.spindle != before.spindle && self.running.is_some() {
-            self.light_block();
+        if self.overrides.spindle != before.spindle {
+            self.override_output();
         }
     }
 
@@ -103,30 +103,37 @@ impl Controller {
         wanted.max(self.settings.s_min).min(self.settings.s_max)
     }
 
-    /// 0xA0: air on or off by hand.
-    pub(super) fn toggle_flood(&mut self) {
-        if matches!(self.state, State::Idle | State::Run | State::Hold { .. }) {
-            self.modal.flood ^= true;
+    /// The output of a standing machine from now on. With dynamic power in laser mode that is none.
+    pub(super) fn set_output(&mut self, spindle: Spindle, s: f64) {
+        let light = self.light(spindle, s, false);
+        let dark = spindle == Spindle::Off || light.dynamic;
+        self.rest(if dark { Light::DARK } else { light });
+        self.accessory_changed();
+    }
+
+    /// Mist and flood from now on.
+    pub(super) fn set_air(&mut self, air: [bool; 2]) {
+        self.air = air;
+        self.accessory_changed();
+    }
+
+    /// The next report tells what is switched on.
+    fn accessory_changed(&mut self) {
+        if self.settings.flavour.tells_accessories_apart() {
+            self.accessory_news = true;
+        } else {
             self.overrides_in = 0;
         }
     }
 
-    /// 0x9E: in a hold, the output off once it stands, or on again. In laser mode it is off already, and comes back
-    /// only with the motion.
-    pub(super) fn spindle_stop(&mut self) {
-        match self.state {
-            State::Hold { standing: true } if !self.settings.laser_mode => {
-                let light = if self.bed.lit() {
-                    Light::DARK
-                } else {
-                    self.before_hold
-                };
-                let head = self.on_bed(self.position);
-                self.shine(head, light);
-                self.overrides_in = 0;
-            }
-            State::Hold { standing: false } => self.stop_output = true,
-            _ => {}
+    /// 0xA0: air on or off by hand.
+    pub(super) fn toggle_flood(&mut self) {
+        if matches!(
+            self.state,
+            State::Idle | State::Run | State::Hold { .. } | State::Jog
+        ) {
+            self.modal.flood ^= true;
+            self.set_air([self.modal.mist, self.modal.flood]);
         }
     }
 }

@@ -3,16 +3,20 @@
 use super::overrides::Overrides;
 use super::{Controller, Line, MEMORY_S, State};
 use crate::planner::READING_AT_REST;
-use crate::sim::burnt::Light;
 use crate::sim::flavour::Flavour;
 use crate::sim::modal::{Action, Arc, Spindle, interpret};
 
 impl Controller {
+    /// Whether the main program waits for a person. GRBL and FluidNC go on reading lines while they brake; grblHAL
+    /// does not.
     pub(super) fn suspended(&self) -> bool {
-        matches!(
-            self.state,
-            State::Hold { .. } | State::Door { .. } | State::Critical | State::Sleep
-        )
+        match self.state {
+            State::Hold { standing } | State::Door { standing } => {
+                standing || self.settings.flavour == Flavour::GrblHal
+            }
+            State::Critical | State::Sleep => true,
+            _ => false,
+        }
     }
 
     /// One thing that the main program does now; false if it must wait.
@@ -25,6 +29,9 @@ impl Controller {
             self.status_report();
             return true;
         }
+        if self.resume_s.is_some() {
+            return self.resumed();
+        }
         if self.suspended() {
             return false;
         }
@@ -32,13 +39,6 @@ impl Controller {
             // Its time was spent in `busy_until_s`.
             self.homed();
             return true;
-        }
-        if self.state == State::Restoring {
-            let over = self.restored_s <= self.now_s;
-            if over {
-                self.move_on();
-            }
-            return over;
         }
         if let Some(action) = self.actions.pop_front() {
             return self.act(action);
@@ -146,6 +146,10 @@ impl Controller {
         if self.modal.offset() != offset {
             self.offset_in = 0;
         }
+        // In a motion of laser mode an S word waits for nothing.
+        if !actions.iter().any(|a| matches!(a, Action::Spindle { .. })) {
+            self.spindle_s = self.modal.s;
+        }
         if self.state == State::Check {
             // Nothing moves, but the limits hold.
             let mut ends = actions.iter().filter_map(|action| match action {
@@ -154,7 +158,12 @@ impl Controller {
                 _ => None,
             });
             let fits = !self.settings.soft_limits || ends.all(|t| self.within_travel(t));
+            let ends_program = actions.contains(&Action::End);
             actions.clear();
+            if ends_program {
+                self.overrides = Overrides::default();
+                self.message(self.settings.flavour.program_end());
+            }
             if !fits {
                 self.soft_limit_alarm();
                 return Ok(());
@@ -173,16 +182,11 @@ impl Controller {
                     return self.start_cycle();
                 }
             }
-            Action::Spindle { spindle, s } => {
-                let dark = spindle == Spindle::Off
-                    || (self.settings.laser_mode && spindle == Spindle::Dynamic);
-                self.rest(Light {
-                    s: if dark { 0.0 } else { self.output_word(s) },
-                    spindle,
-                    rapid: false,
-                });
-                self.overrides_in = 0;
+            Action::Spindle { spindle, s, word } => {
+                (self.spindle, self.spindle_s) = (spindle, word);
+                self.set_output(spindle, s);
             }
+            Action::Air(air) => self.set_air(air),
             Action::Line { target, drive } => {
                 if self.queue.is_full() {
                     self.actions.push_front(action);
@@ -224,14 +228,17 @@ impl Controller {
             }
             Action::Pause => self.hold(false),
             Action::End => {
-                self.rest(Light::DARK);
                 self.overrides = Overrides::default();
+                self.spindle = Spindle::Off;
+                self.set_output(Spindle::Off, 0.0);
+                self.set_air([false; 2]);
                 (self.overrides_in, self.offset_in) = (0, 0);
                 self.message(self.settings.flavour.program_end());
             }
             Action::Memory => self.write_memory(),
             Action::Sleep => {
-                self.rest(Light::DARK);
+                self.set_output(Spindle::Off, 0.0);
+                self.set_air([false; 2]);
                 self.state = State::Sleep;
                 self.message("Sleeping");
             }

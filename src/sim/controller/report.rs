@@ -83,43 +83,49 @@ impl Controller {
         }
         let s = self.output_s(speed);
         let _ = write!(text, "|FS:{},{s:.0}", self.rate(speed * 60.0));
-        let busy = usize::from(
-            self.running.is_some() || !matches!(self.state, State::Idle | State::Alarm),
+        let resting = matches!(
+            self.state,
+            State::Idle | State::Alarm | State::Critical | State::Check | State::Sleep
         );
+        let busy = usize::from(!resting);
+        let mut overrides = self.overrides_in == 0;
         if self.offset_in > 0 {
             self.offset_in -= 1;
         } else {
             self.offset_in = OFFSET_EVERY[busy] - 1;
             // The overrides come with the next report, not with this one.
-            self.overrides_in = self.overrides_in.max(1);
+            (overrides, self.overrides_in) = (false, self.overrides_in.max(1));
             let _ = write!(text, "|WCO:{}", self.triple(offset));
         }
-        if self.overrides_in > 0 {
-            self.overrides_in -= 1;
-        } else {
+        if overrides {
             self.overrides_in = OVERRIDES_EVERY[busy] - 1;
             let o = self.overrides;
             let _ = write!(text, "|Ov:{},{},{}", o.feed, o.rapid, o.spindle);
-            let mut accessories = String::new();
-            if self.bed.lit() {
-                accessories.push(if self.light.spindle == Spindle::Dynamic {
-                    'C'
-                } else {
-                    'S'
-                });
-            }
-            if self.modal.flood {
-                accessories.push('F');
-            }
-            if self.modal.mist {
-                accessories.push('M');
-            }
-            if !accessories.is_empty() {
-                let _ = write!(text, "|A:{accessories}");
-            }
+        } else {
+            self.overrides_in -= 1;
+        }
+        let on = self.accessories();
+        if overrides && !on.is_empty() || std::mem::take(&mut self.accessory_news) {
+            self.accessory_news = false;
+            let _ = write!(text, "|A:{on}");
         }
         text.push('>');
         self.say(&text);
+    }
+
+    /// What is switched on now, as one letter each.
+    fn accessories(&self) -> String {
+        let clockwise = self.light.spindle != Spindle::Dynamic;
+        let [mist, flood] = self.air;
+        [
+            (self.bed.lit() && clockwise, 'S'),
+            (self.bed.lit() && !clockwise, 'C'),
+            (flood, 'F'),
+            (mist, 'M'),
+        ]
+        .into_iter()
+        .filter_map(|(on, letter)| on.then_some(letter))
+        .collect()
     }
 
     /// The power that the output has now, in S: with dynamic power the programmed one times speed over rate.
@@ -127,12 +133,8 @@ impl Controller {
         let Some((_, cut)) = self.queue.front().filter(|_| self.running.is_some()) else {
             return self.bed.s();
         };
-        match (
-            self.settings.laser_mode,
-            cut.drive.spindle,
-            cut.drive.rate_mm_min,
-        ) {
-            (true, Spindle::Dynamic, Some(rate)) => {
+        match (self.light.dynamic, cut.drive.rate_mm_min) {
+            (true, Some(rate)) => {
                 (self.bed.s() * speed_mm_s * 60.0 / rate).min(self.settings.s_max)
             }
             _ => self.bed.s(),

@@ -67,7 +67,7 @@ impl Controller {
             self.lost_bytes += 1;
             return;
         }
-        if self.state == State::Sleep && !matches!(byte, 0x18 | b'?') {
+        if self.state == State::Sleep && !matches!(byte, 0x18 | b'?' | 0x84) {
             return;
         }
         match byte {

@@ -112,7 +112,7 @@ impl Words {
             return Err(23);
         }
         match code {
-            0 | 2 | 30 => {
+            0..=2 | 30 => {
                 self.group(9)?;
                 self.flow = Some(code);
             }

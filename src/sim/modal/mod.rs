@@ -46,8 +46,10 @@ pub(crate) struct Drive {
 pub(crate) enum Action {
     /// Wait until everything planned has been done.
     Sync,
-    /// Set the output while standing.
-    Spindle { spindle: Spindle, s: f64 },
+    /// Set the output while standing; `word` is the S that holds from then on.
+    Spindle { spindle: Spindle, s: f64, word: f64 },
+    /// Mist and flood.
+    Air([bool; 2]),
     /// Plan a straight move to a place in machine coordinates.
     Line { target: [f64; 3], drive: Drive },
     /// Plan an arc.
@@ -195,6 +197,7 @@ pub(crate) fn interpret(
             todo.push(Action::Spindle {
                 spindle: modal.spindle,
                 s: if dark { 0.0 } else { s },
+                word: s,
             });
         }
         next.s = s;
@@ -207,6 +210,7 @@ pub(crate) fn interpret(
         todo.push(Action::Spindle {
             spindle,
             s: block_s,
+            word: next.s,
         });
         next.spindle = spindle;
     }
@@ -220,6 +224,7 @@ pub(crate) fn interpret(
         );
         if wanted != (next.mist, next.flood) {
             todo.push(Action::Sync);
+            todo.push(Action::Air([wanted.0, wanted.1]));
         }
         (next.mist, next.flood) = wanted;
     }
@@ -332,6 +337,8 @@ pub(crate) fn interpret(
             todo.push(Action::Sync);
             todo.push(Action::Pause);
         }
+        // An optional stop is none.
+        Some(1) => {}
         Some(_) => {
             todo.push(Action::Sync);
             todo.push(Action::End);

@@ -183,53 +183,6 @@ fn with_m4_the_power_follows_an_overridden_feed() {
 }
 
 #[test]
-fn a_spindle_stop_while_braking_acts_once_it_stands_and_in_laser_mode_lights_nothing() {
-    let mut b = Bench::new(Settings {
-        laser_mode: false,
-        ..Settings::default()
-    });
-    b.send("G21G90\nM3S500\nG1F3000X60\n", 0.7);
-    b.raw(b'!', 0.02);
-    b.raw(0x9e, 1.0);
-    assert!(!b.machine.beam_on());
-    b.raw(b'?', 0.1);
-    assert!(!b.raw(b'?', 0.1).contains("|A:"));
-    b.raw(0x9e, 0.1);
-    assert!(b.machine.beam_on());
-    assert!(b.raw(b'?', 0.1).contains("|A:S"));
-
-    let mut b = Bench::laser();
-    b.send(M3, 0.0);
-    b.send("G1X60\n", 0.7);
-    b.raw(b'!', 1.0);
-    b.raw(0x9e, 1.0);
-    assert!(!b.machine.beam_on(), "laser mode: dark until it moves");
-    b.raw(b'~', 0.1);
-    assert!(b.machine.beam_on());
-}
-
-#[test]
-fn behind_the_door_a_torch_comes_back_before_the_motion() {
-    let mut b = Bench::new(Settings {
-        laser_mode: false,
-        ..Settings::default()
-    });
-    b.send("G21G90\nM3S500\nG1F3000X60\n", 0.7);
-    b.raw(0x84, 1.0);
-    assert!(!b.machine.beam_on());
-    let place = b.machine.position_mm();
-    b.raw(b'~', 2.0);
-    assert!(b.raw(b'?', 0.1).contains("<Door:3|"));
-    assert!(b.machine.beam_on());
-    assert_eq!(b.machine.position_mm(), place);
-    // Opened again meanwhile: dark again.
-    b.raw(0x84, 0.1);
-    assert!(!b.machine.beam_on());
-    b.raw(b'~', 10.0);
-    assert_eq!(b.machine.position_mm()[0], 60.0);
-}
-
-#[test]
 fn asleep_it_is_dark_and_wakes_only_by_a_reset_and_locked() {
     let mut b = Bench::laser();
     b.send("M3S5\nG1F100\n", 0.2);

@@ -6,6 +6,7 @@ mod manners;
 mod memory;
 mod pace;
 mod table;
+mod torch;
 
 use super::*;
 use crate::sim::Flavour;
@@ -29,6 +30,24 @@ impl Bench {
 
     fn laser() -> Self {
         Self::new(Settings::default())
+    }
+
+    /// A torch: an output that is on or off, without laser mode.
+    fn torch() -> Self {
+        Self::torch_of(Flavour::Grbl)
+    }
+
+    fn torch_of(flavour: Flavour) -> Self {
+        let settings = Settings {
+            laser_mode: false,
+            ..Settings::default()
+        };
+        Self::new(settings.with_flavour(flavour))
+    }
+
+    /// The next report.
+    fn report(&mut self) -> String {
+        self.raw(b'?', 0.01)
     }
 
     fn wait(&mut self, seconds: f64) -> String {

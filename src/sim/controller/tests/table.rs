@@ -92,22 +92,6 @@ fn hold_then_reset_at_rest_is_dark_and_keeps_the_position() {
 }
 
 #[test]
-fn a_hold_without_laser_mode_leaves_the_output_on_until_the_door_or_a_spindle_stop() {
-    for stop in [0x84, 0x9e] {
-        let mut b = Bench::new(Settings {
-            laser_mode: false,
-            ..Settings::default()
-        });
-        b.send("G21G90\nM3S500\nG1F3000X60\n", 0.7);
-        b.raw(b'!', 1.0);
-        assert_eq!(b.machine.state(), State::Hold { standing: true });
-        assert!(b.machine.beam_on(), "the output stays on while holding");
-        b.raw(stop, 0.1);
-        assert!(!b.machine.beam_on());
-    }
-}
-
-#[test]
 fn m3_then_a_bare_g1_then_a_dwell_burns_while_standing() {
     let mut b = Bench::laser();
     b.send("G21G90\nG1F600\nG0X5\nM3S500\nG1\nG4P1\n", 0.6);
