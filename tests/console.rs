@@ -12,7 +12,7 @@ use kagome::control::{
 };
 use kagome::gcode::Dialect;
 use kagome::machine::Origin;
-use kagome::sim::{Controller, Settings, SimTransport};
+use kagome::sim::{Controller, Flavour, Settings, SimTransport};
 
 /// Interrupts when it has been asked so often.
 struct After(AtomicU32);
@@ -167,7 +167,7 @@ fn a_job_is_read_by_the_controller_without_motion() {
     let good = "G21 G90 G54\nM5\nG0 X10 Y10\nM4 S500\nG1 X60 F1200\nM5\nM2\n";
     // The sender's own check does not know how far an arc's ends may differ; the controller does.
     let bad = good.replace("G1 X60 F1200", "G1 X60 F1200\nG2 X70 Y10 I50 J3");
-    for flavour in [kagome::sim::Flavour::Grbl, kagome::sim::Flavour::GrblHal] {
+    for flavour in [Flavour::Grbl, Flavour::GrblHal] {
         let mut line = machine(Settings {
             flavour,
             ..Settings::default()
@@ -189,43 +189,51 @@ fn a_job_is_read_by_the_controller_without_motion() {
 fn a_job_that_would_leave_the_travel_is_not_begun() {
     let text = "G21 G90 G54\nM5\nG0 X10 Y10\nM4 S500\nG1 X60 F1200\nM5\nM2\n";
     let job = Job::check(text.as_bytes(), &JobRules::default()).unwrap();
-    let mut profile = kagome::machine::load("co2-600x400").unwrap();
-    profile.motion.rate_mm_per_min.x = 1234.0;
-    let options = SendOptions {
-        made_for: Some(Box::new((profile, JobReach::of(text, Dialect::Laser)))),
-        ..SendOptions::default()
-    };
-    let homed = || {
-        let mut line = machine(Settings {
-            homing: true,
-            ..Settings::default()
-        });
-        Console::open(&mut line, &Silent).unwrap().home().unwrap();
-        line
-    };
-    let mut line = homed();
-    let error = send(&mut line, &job, &options, &Silent)
-        .unwrap_err()
-        .to_string();
-    assert!(
-        error.contains("kagome zero") && error.contains("Nothing was sent"),
-        "{error}"
-    );
-    dark(&line);
-    // With the zero where the sheet lies it is.
-    let mut line = homed();
-    let mut console = Console::open(&mut line, &Silent).unwrap();
-    let away = Move {
-        to: JogTo::Machine,
-        axes_mm: [Some(-400.0), Some(-400.0), None],
-        feed_mm_per_min: 6000.0,
-    };
-    console.jog(&away).unwrap();
-    console.set_zero([Some(0.0), Some(0.0), None]).unwrap();
-    let told = Notes::default();
-    send(&mut line, &job, &options, &told).unwrap();
-    let told = told.0.into_inner().unwrap();
-    assert!(told.iter().any(|t| t.contains("rate of X")), "{told:?}");
+    // FluidNC has its travel in a file of its own, and tells it too.
+    for (profile, flavour) in [
+        ("co2-600x400", Flavour::Grbl),
+        ("diode-400-fluidnc", Flavour::FluidNc),
+    ] {
+        let mut profile = kagome::machine::load(profile).unwrap();
+        profile.motion.rate_mm_per_min.x = 1234.0;
+        let options = SendOptions {
+            made_for: Some(Box::new((profile, JobReach::of(text, Dialect::Laser)))),
+            buffer: Some(128),
+            ..SendOptions::default()
+        };
+        let homed = || {
+            let settings = Settings {
+                homing: true,
+                ..Settings::default()
+            };
+            let mut line = machine(settings.with_flavour(flavour));
+            Console::open(&mut line, &Silent).unwrap().home().unwrap();
+            line
+        };
+        let mut line = homed();
+        let error = send(&mut line, &job, &options, &Silent)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("kagome zero") && error.contains("Nothing was sent"),
+            "{error}"
+        );
+        dark(&line);
+        // With the zero where the sheet lies it is.
+        let mut line = homed();
+        let mut console = Console::open(&mut line, &Silent).unwrap();
+        let away = Move {
+            to: JogTo::Machine,
+            axes_mm: [Some(-400.0), Some(-400.0), None],
+            feed_mm_per_min: 6000.0,
+        };
+        console.jog(&away).unwrap();
+        console.set_zero([Some(0.0), Some(0.0), None]).unwrap();
+        let told = Notes::default();
+        send(&mut line, &job, &options, &told).unwrap();
+        let told = told.0.into_inner().unwrap();
+        assert!(told.iter().any(|t| t.contains("rate of X")), "{told:?}");
+    }
 }
 
 /// Keeps what it is told.

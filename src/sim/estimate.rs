@@ -85,6 +85,13 @@ pub fn estimate(job: &str, settings: &Settings) -> Result<Estimate, EstimateErro
                     }
                     continue;
                 }
+                Action::Probe(probe) => {
+                    // It ends on the sheet, and the job goes on from there.
+                    let end = probe.end(settings.surface_mm);
+                    modal.position = end;
+                    steps.push(step(end, &probe.drive, &mut at, &mut bytes));
+                    0.0
+                }
                 Action::Sync | Action::Pause | Action::End => 0.0,
                 Action::Dwell { left_s, .. } => left_s,
                 Action::Spindle { .. }

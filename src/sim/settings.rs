@@ -58,6 +58,9 @@ pub struct Settings {
     pub acceleration_mm_s2: [f64; 3],
     /// `$130`–`$132`: travel, mm.
     pub travel_mm: [f64; 3],
+    /// Where the sheet's surface lies, machine Z of the bed, mm: there and below the probe's contact is closed. None:
+    /// nothing is ever touched. Not a `$` setting.
+    pub surface_mm: Option<f64>,
     /// Receive buffer, bytes. Not a `$` setting: compiled in, and told by `$I`.
     pub receive_buffer: usize,
     /// Usable planner blocks. Compiled in, and told by `$I`.
@@ -95,6 +98,7 @@ impl Default for Settings {
             max_rate_mm_min: [6000.0, 6000.0, 3000.0],
             acceleration_mm_s2: [500.0; 3],
             travel_mm: [500.0, 500.0, 200.0],
+            surface_mm: None,
             receive_buffer: 128,
             planner_blocks: 15,
             byte_time_s: Flavour::Grbl.byte_time_s(),

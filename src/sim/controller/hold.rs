@@ -127,6 +127,13 @@ impl Controller {
                 return self.idle_delay();
             }
         }
+        if self.state == State::Run {
+            // Probing has found something.
+            self.queue.clear();
+            self.state = State::Idle;
+            self.rest(self.at_rest);
+            return self.idle_delay();
+        }
         self.restore = self.found();
         self.rest(self.at_rest);
         if matches!(self.state, State::Door { .. }) {
@@ -269,6 +276,9 @@ impl Controller {
         }) = self.actions.front_mut()
         {
             *until += self.now_s - self.held_since_s;
+        }
+        if self.found_something() {
+            self.queue.clear();
         }
         if self.queue.is_empty() {
             self.state = State::Idle;

@@ -65,15 +65,20 @@ impl Controller {
                 (part.is_finite() && place_mm > running.behind_mm).then_some(place_mm)
             })
             .fold(f64::INFINITY, f64::min);
-        let along = place_mm - running.behind_mm;
-        if along > running.profile.length_mm() {
+        self.passes_s(place_mm - running.behind_mm)
+    }
+
+    /// When the head has gone this far along what runs now, mm, s; none if it does not come so far.
+    pub(super) fn passes_s(&self, along_mm: f64) -> Option<f64> {
+        let running = self.running.as_ref()?;
+        if along_mm > running.profile.length_mm() {
             return None;
         }
         // Place grows with time: halve the interval.
         let (mut low, mut high) = (0.0, running.profile.duration_s());
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if running.profile.at(middle).0 < along {
+            if running.profile.at(middle).0 < along_mm {
                 low = middle;
             } else {
                 high = middle;

@@ -6,13 +6,14 @@
 //! buffer full; the main program, which reads one line after the other and waits where the firmware waits; and the
 //! motion, which goes on by itself.
 //!
-//! Not simulated: probing, spindle synchronisation, parking, the motion of homing (the head is there after its time).
+//! Not simulated: spindle synchronisation, parking, the motion of homing (the head is there after its time).
 
 mod hold;
 mod limits;
 mod motion;
 mod overrides;
 mod power;
+mod probe;
 mod program;
 mod report;
 mod reset;
@@ -31,6 +32,7 @@ use crate::planner::{Profile, Queue};
 
 use hold::{Restore, Stop};
 use overrides::Overrides;
+use probe::Probing;
 
 pub use power::Life;
 
@@ -77,8 +79,8 @@ struct Cut {
     end: [f64; 3],
     length_mm: f64,
     drive: Drive,
-    /// A jog: the feed override does not touch it.
-    jog: bool,
+    /// A jog, or probing: the feed override does not touch it.
+    fixed_feed: bool,
 }
 
 /// The block that moves now.
@@ -156,6 +158,9 @@ pub struct Controller {
     soft_limit_hit: bool,
     /// A jog is being cancelled.
     jog_cancelled: bool,
+    probing: Option<Probing>,
+    /// What probing found last, and whether it did.
+    probed: ([f64; 3], bool),
     /// What became of 0x9E.
     stop: Stop,
     /// What a hold puts back at its end.
@@ -226,6 +231,8 @@ impl Controller {
             zero: [0.0; 3],
             soft_limit_hit: false,
             jog_cancelled: false,
+            probing: None,
+            probed: ([0.0; 3], false),
             stop: Stop::None,
             restore: Restore::NOTHING,
             held_since_s: 0.0,
@@ -354,7 +361,7 @@ impl Controller {
         if let Some(running) = &self.running {
             next = next.min(running.start_s + running.profile.duration_s());
         }
-        if let Some(at) = self.switch_s() {
+        for at in self.switch_s().into_iter().chain(self.touch_s()) {
             next = next.min(at);
         }
         if self.busy_until_s > self.now_s {
@@ -422,6 +429,10 @@ impl Controller {
             }
             if self.switch_s().is_some_and(|at| at <= self.now_s) {
                 self.limit_switch();
+                progress = true;
+            }
+            if self.touch_s().is_some_and(|at| at <= self.now_s) {
+                self.touch();
                 progress = true;
             }
             if let Some(running) = self.running

@@ -19,7 +19,7 @@ impl Controller {
     }
 
     /// Plans a straight move: soft limits, whole steps, and the look-ahead of what already moves.
-    pub(super) fn plan_line(&mut self, target: [f64; 3], drive: Drive, jog: bool) {
+    pub(super) fn plan_line(&mut self, target: [f64; 3], drive: Drive, fixed_feed: bool) {
         if self.settings.soft_limits && !self.within_travel(target) {
             self.beyond_travel();
             return;
@@ -36,7 +36,7 @@ impl Controller {
             end,
             length_mm,
             drive,
-            jog,
+            fixed_feed,
         };
         let exit_before = self.queue.exit_sqr();
         let mut now = (0.0, 0.0);
@@ -100,6 +100,7 @@ impl Controller {
     /// Braking to a rest in the middle of what is planned.
     pub(super) fn braking(&self) -> bool {
         self.jog_cancelled
+            || self.found_something()
             || matches!(
                 self.state,
                 State::Hold { standing: false } | State::Door { standing: false }

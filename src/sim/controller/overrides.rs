@@ -50,7 +50,11 @@ impl Overrides {
         let share = |percent: u16| f64::from(percent) / 100.0;
         match cut.drive.rate_mm_min {
             Some(rate) => {
-                let feed = if cut.jog { 1.0 } else { share(self.feed) };
+                let feed = if cut.fixed_feed {
+                    1.0
+                } else {
+                    share(self.feed)
+                };
                 (rate * feed).max(1.0).min(block.fastest_mm_s * 60.0) / 60.0
             }
             None => block.fastest_mm_s * share(self.rapid),

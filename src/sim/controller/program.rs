@@ -155,6 +155,7 @@ impl Controller {
             let mut ends = actions.iter().filter_map(|action| match action {
                 Action::Line { target, .. } => Some(*target),
                 Action::Arc(arc) => Some(arc.target),
+                // Where probing leads is not looked at.
                 _ => None,
             });
             let fits = !self.settings.soft_limits || ends.all(|t| self.within_travel(t));
@@ -204,6 +205,7 @@ impl Controller {
                 }
                 self.plan_jog(target, rate_mm_min);
             }
+            Action::Probe(probe) => return self.probe(probe),
             Action::Arc(mut arc) => {
                 if let Some(target) = arc.point() {
                     if self.queue.is_full() {

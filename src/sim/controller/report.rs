@@ -83,6 +83,9 @@ impl Controller {
         }
         let s = self.output_s(speed);
         let _ = write!(text, "|FS:{},{s:.0}", self.rate(speed * 60.0));
+        if self.probe_pin() {
+            text.push_str("|Pn:P");
+        }
         let resting = matches!(
             self.state,
             State::Idle | State::Alarm | State::Critical | State::Check | State::Sleep
@@ -156,13 +159,17 @@ impl Controller {
             (true, true) => "M7 M8",
         };
         let feed = self.rate(m.feed_mm_min);
+        let motion = match m.motion {
+            probing @ 380.. => format!("38.{}", probing - 380),
+            plain => plain.to_string(),
+        };
         let text = format!(
-            "[GC:G{} G{} G{} G{} G{} G94 M{spindle} {coolant} T{:.0} F{feed} S{:.0}]",
-            m.motion,
+            "[GC:G{motion} G{} G{} G{} G{} G{} M{spindle} {coolant} T{:.0} F{feed} S{:.0}]",
             54 + m.system,
             m.plane,
             if m.inches { 20 } else { 21 },
             if m.incremental { 91 } else { 90 },
+            if m.inverse_time { 93 } else { 94 },
             m.tool,
             m.s,
         );
@@ -180,11 +187,19 @@ impl Controller {
             self.say(&text);
         }
         let g92 = format!("[G92:{}]", self.triple(self.modal.g92));
-        let none = self.triple([0.0; 3]);
-        let length = none.split(',').next().unwrap_or_default();
-        let (tlo, probe) = (format!("[TLO:{length}]"), format!("[PRB:{none}:0]"));
-        for text in [g92, tlo, probe] {
+        let length = self.triple([self.modal.tool_length, 0.0, 0.0]);
+        let length = length.split(',').next().unwrap_or_default();
+        let length = format!("[TLO:{length}]");
+        for text in [g92, length] {
             self.say(&text);
         }
+        self.probe_report();
+    }
+
+    /// What probing found last, machine coordinates.
+    pub(super) fn probe_report(&mut self) {
+        let (place, found) = self.probed;
+        let text = format!("[PRB:{}:{}]", self.triple(place), u8::from(found));
+        self.say(&text);
     }
 }

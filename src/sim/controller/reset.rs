@@ -34,6 +34,7 @@ impl Controller {
 
     pub(super) fn forget_program(&mut self) {
         self.actions.clear();
+        self.probing = None;
         self.answer = None;
         self.reset_pending = false;
         self.starting.clear();
@@ -52,6 +53,7 @@ impl Controller {
         (self.jog_cancelled, self.stop, self.resume_s) = (false, Stop::None, None);
         (self.spindle, self.spindle_s, self.air) = (Spindle::Off, 0.0, [false; 2]);
         (self.offset_in, self.overrides_in, self.accessory_news) = (0, 0, false);
+        self.probed = ([0.0; 3], false);
         self.overrides = Overrides::default();
         (self.latched, self.line_end) = (None, None);
         self.modal.reset(self.position);
@@ -80,6 +82,8 @@ impl Controller {
             let name = match number {
                 1 => "Hard Limit",
                 2 => "Soft Limit",
+                4 => "Probe Fail Initial",
+                5 => "Probe Fail Contact",
                 _ => "Abort Cycle",
             };
             self.message(&format!("ALARM: {name}"));

@@ -20,6 +20,13 @@ pub(crate) struct Arc {
 }
 
 impl Arc {
+    /// The length of its segments together, mm.
+    pub fn segments_mm(&self) -> f64 {
+        let count = f64::from(self.segments);
+        let chord = 2.0 * self.radius * (0.5 * self.sweep / count).sin();
+        count * chord.hypot((self.target[self.axes[2]] - self.from_linear) / count)
+    }
+
     /// The end of the next segment, or none when the arc is done.
     pub fn point(&self) -> Option<[f64; 3]> {
         if self.next > self.segments {

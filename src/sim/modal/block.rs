@@ -7,12 +7,17 @@ use crate::sim::words::next_word;
 #[derive(Default)]
 pub(super) struct Words {
     pub value: [Option<f64>; 26],
-    pub motion: Option<u8>,
+    /// 0 to 3 and 80; 382 to 385 for the ways of probing.
+    pub motion: Option<u16>,
     /// G4, G10, G28, G28.1, G30, G30.1, G53, G92, G92.1 as the integer times ten, plus the fraction's first digit.
     pub other: Option<u16>,
     pub plane: Option<u8>,
     pub inches: Option<bool>,
     pub incremental: Option<bool>,
+    /// G93, not G94.
+    pub inverse_time: Option<bool>,
+    /// G43.1, not G49.
+    pub tool_length: Option<bool>,
     pub system: Option<usize>,
     pub flow: Option<u8>,
     pub spindle: Option<Spindle>,
@@ -67,14 +72,21 @@ impl Words {
         let (number, hundredths) = command(value);
         let code = match (number, hundredths) {
             (_, 0) => u16::from(number) * 10,
-            (28 | 30 | 91 | 92, 10) => u16::from(number) * 10 + 1,
+            (28 | 30 | 43 | 91 | 92, 10) => u16::from(number) * 10 + 1,
+            (38, 20 | 30 | 40 | 50) => 380 + u16::from(hundredths) / 10,
+            // Whatever its fraction.
+            (49, _) => 490,
             (0..=4 | 10 | 17..=21 | 40 | 53..=59 | 80 | 93 | 94, _) => return Err(23),
             _ => return Err(20),
         };
         match code {
             0 | 10 | 20 | 30 | 800 => {
                 self.group(1)?;
-                self.motion = u8::try_from(code / 10).ok();
+                self.motion = Some(code / 10);
+            }
+            382..=385 => {
+                self.group(1)?;
+                self.motion = Some(code);
             }
             40 | 100 | 280 | 281 | 300 | 301 | 530 | 920 | 921 => {
                 self.group(0)?;
@@ -89,13 +101,19 @@ impl Words {
                 self.incremental = Some(code == 910);
             }
             911 => self.group(4)?,
-            940 => self.group(5)?,
+            930 | 940 => {
+                self.group(5)?;
+                self.inverse_time = Some(code == 930);
+            }
             200 | 210 => {
                 self.group(6)?;
                 self.inches = Some(code == 200);
             }
             400 => self.group(7)?,
-            490 => self.group(8)?,
+            431 | 490 => {
+                self.group(8)?;
+                self.tool_length = Some(code == 431);
+            }
             540 | 550 | 560 | 570 | 580 | 590 => {
                 self.group(12)?;
                 self.system = Some(usize::from(code / 10 - 54));

@@ -14,6 +14,8 @@ pub(crate) fn interpret_jog(line: &[u8], modal: &Modal) -> Result<Action, u8> {
     let mode_words = words.motion.is_some()
         || words.plane.is_some()
         || words.system.is_some()
+        || words.inverse_time.is_some()
+        || words.tool_length.is_some()
         || words.flow.is_some()
         || words.spindle.is_some()
         || words.coolant.is_some()

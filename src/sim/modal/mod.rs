@@ -1,7 +1,7 @@
 //! What GRBL's interpreter remembers between lines, and what one line makes it do.
 //!
 //! Written from GRBL 1.1h's documented behaviour; shares nothing with our own G-code writer and reader, so that it can
-//! judge them. Not simulated, and answered with `error:20`: G38, G43.1, G93; and M7, which stock GRBL is built without.
+//! judge them. M7 is answered with `error:20` by GRBL alone: it is built without.
 
 mod arc;
 mod block;
@@ -41,6 +41,33 @@ pub(crate) struct Drive {
     pub s: f64,
 }
 
+/// G38.2 to G38.5: a straight move that ends where the probe's contact closes, or opens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Probe {
+    pub target: [f64; 3],
+    /// Where the interpreter was before.
+    pub from: [f64; 3],
+    pub drive: Drive,
+    /// G38.4, G38.5: until the contact opens.
+    pub away: bool,
+    /// G38.2, G38.4: it is an alarm if nothing is found.
+    pub strict: bool,
+}
+
+impl Probe {
+    /// Where it ends over a sheet at this height, mm.
+    pub fn end(&self, surface_mm: Option<f64>) -> [f64; 3] {
+        let (from, to) = (self.from[2], self.target[2]);
+        let part = surface_mm.map_or(1.0, |z| (z - from) / (to - from));
+        let part = if (0.0..1.0).contains(&part) {
+            part
+        } else {
+            1.0
+        };
+        std::array::from_fn(|k| self.from[k] + (self.target[k] - self.from[k]) * part)
+    }
+}
+
 /// What a line makes the controller do, in order.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Action {
@@ -54,6 +81,8 @@ pub(crate) enum Action {
     Line { target: [f64; 3], drive: Drive },
     /// Plan an arc.
     Arc(Arc),
+    /// Move until the probe says so.
+    Probe(Probe),
     /// Stand for this long, s.
     Dwell { left_s: f64, until_s: Option<f64> },
     /// M0: hold until `~`.
@@ -73,11 +102,14 @@ pub(crate) enum Action {
 /// Modal state. Lengths in mm, places in machine coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Modal {
-    /// 0, 1, 2, 3, or 80.
-    pub motion: u8,
+    /// 0, 1, 2, 3, or 80; 382 to 385 for G38.2 to G38.5.
+    pub motion: u16,
     pub plane: u8,
     pub inches: bool,
     pub incremental: bool,
+    /// G93: F is how often a minute the move could be made.
+    pub inverse_time: bool,
+    /// In inverse time, per minute.
     pub feed_mm_min: f64,
     pub spindle: Spindle,
     pub s: f64,
@@ -89,6 +121,8 @@ pub(crate) struct Modal {
     /// Where G28 and G30 go, machine coordinates.
     pub places: [[f64; 3]; 2],
     pub g92: [f64; 3],
+    /// The length of the tool, mm along Z.
+    pub tool_length: f64,
     pub position: [f64; 3],
 }
 
@@ -99,6 +133,7 @@ impl Modal {
             plane: 17,
             inches: false,
             incremental: false,
+            inverse_time: false,
             feed_mm_min: 0.0,
             spindle: Spindle::Off,
             s: 0.0,
@@ -109,13 +144,22 @@ impl Modal {
             systems: [[0.0; 3]; 6],
             places: [[0.0; 3]; 2],
             g92: [0.0; 3],
+            tool_length: 0.0,
             position: [0.0; 3],
         }
     }
 
     /// Where the work origin is, machine coordinates.
     pub fn offset(&self) -> [f64; 3] {
-        std::array::from_fn(|k| self.systems[self.system][k] + self.g92[k])
+        let mut offset: [f64; 3] =
+            std::array::from_fn(|k| self.systems[self.system][k] + self.g92[k]);
+        offset[2] += self.tool_length;
+        offset
+    }
+
+    /// The tool's length, where it counts.
+    fn tool_offset(&self, axis: usize) -> f64 {
+        if axis == 2 { self.tool_length } else { 0.0 }
     }
 
     /// Where a line's axis words lead, machine coordinates.
@@ -158,17 +202,24 @@ pub(crate) fn interpret(
     let axis_words = [b'X', b'Y', b'Z'].map(|l| words.get(l));
     let any_axis = axis_words.iter().any(Option::is_some);
     let takes_axes = matches!(words.other, Some(100 | 280 | 300 | 920));
-    if takes_axes && matches!(words.motion, Some(0..=3)) {
+    let moves = words.motion.is_some_and(|motion| motion != 80);
+    let length = words.tool_length;
+    if usize::from(takes_axes) + usize::from(moves) + usize::from(length.is_some()) > 1 {
         return Err(24);
     }
-    let moving = !takes_axes && (any_axis || matches!(words.motion, Some(0..=3)));
+    let moving = !takes_axes && length.is_none() && (any_axis || moves);
 
     if words.take(b'N').is_some_and(|n| n > 10_000_000.0) {
         return Err(27);
     }
     next.inches = words.inches.unwrap_or(next.inches);
     let unit = if next.inches { 25.4 } else { 1.0 };
-    if let Some(f) = words.take(b'F') {
+    next.inverse_time = words.inverse_time.unwrap_or(next.inverse_time);
+    let feed = words.take(b'F');
+    if next.inverse_time || modal.inverse_time {
+        // Such a rate holds for its own line, and is nobody's unit.
+        next.feed_mm_min = feed.unwrap_or(0.0);
+    } else if let Some(f) = feed {
         next.feed_mm_min = f * unit;
     }
     if let Some(t) = words.take(b'T') {
@@ -229,6 +280,13 @@ pub(crate) fn interpret(
         (next.mist, next.flood) = wanted;
     }
 
+    match length {
+        Some(true) if axis_words.map(|w| w.is_some()) != [false, false, true] => return Err(37),
+        Some(true) => next.tool_length = axis_words[2].unwrap_or(0.0) * unit,
+        Some(false) => next.tool_length = 0.0,
+        None => {}
+    }
+
     match words.other {
         Some(40) => {
             let seconds = words.take(b'P').ok_or(28u8)?;
@@ -254,7 +312,8 @@ pub(crate) fn interpret(
             }
             for (k, word) in axis_words.iter().enumerate() {
                 if let Some(value) = word {
-                    next.g92[k] = next.position[k] - next.systems[next.system][k] - value * unit;
+                    let bare = next.position[k] - next.systems[next.system][k] - value * unit;
+                    next.g92[k] = bare - next.tool_offset(k);
                 }
             }
         }
@@ -289,13 +348,13 @@ pub(crate) fn interpret(
         _ => {}
     }
 
+    if next.motion == 80 && any_axis {
+        return Err(31);
+    }
     if moving {
         let absolute_machine = words.other == Some(530);
         if absolute_machine && !matches!(next.motion, 0 | 1) {
             return Err(30);
-        }
-        if next.motion == 80 {
-            return Err(31);
         }
         if next.motion != 0 && next.feed_mm_min == 0.0 {
             return Err(22);
@@ -304,27 +363,50 @@ pub(crate) fn interpret(
         if target.iter().any(|t| !t.is_finite() || t.abs() > 1e6) {
             return Err(33);
         }
+        let way: [f64; 3] = std::array::from_fn(|k| target[k] - next.position[k]);
+        let rate = if next.inverse_time {
+            next.feed_mm_min * way.iter().map(|w| w * w).sum::<f64>().sqrt()
+        } else {
+            next.feed_mm_min
+        };
         let drive = Drive {
-            rate_mm_min: (next.motion != 0).then_some(next.feed_mm_min),
+            rate_mm_min: (next.motion != 0).then_some(rate),
             spindle: next.spindle,
             s: block_s,
         };
-        if next.motion >= 2 {
-            if !any_axis {
-                return Err(26);
+        if next.motion > 1 && !any_axis {
+            return Err(26);
+        }
+        match next.motion {
+            0 | 1 if any_axis => todo.push(Action::Line { target, drive }),
+            0 | 1 => {}
+            2 | 3 => {
+                let mut arc = arc(&mut words, &next, target, drive, unit, settings)?;
+                if next.inverse_time {
+                    arc.drive.rate_mm_min = Some(next.feed_mm_min * arc.segments_mm());
+                }
+                todo.push(Action::Arc(arc));
             }
-            todo.push(Action::Arc(arc(
-                &mut words, &next, target, drive, unit, settings,
-            )?));
-        } else if any_axis {
-            todo.push(Action::Line { target, drive });
+            _ => {
+                if way.iter().all(|w| w.abs() < 1e-9) {
+                    return Err(33);
+                }
+                todo.push(Action::Sync);
+                todo.push(Action::Probe(Probe {
+                    target,
+                    from: next.position,
+                    drive,
+                    away: next.motion >= 384,
+                    strict: next.motion % 2 == 0,
+                }));
+            }
         }
         if any_axis {
             next.position = target;
         }
     }
     for letter in [b'X', b'Y', b'Z'] {
-        if moving || takes_axes {
+        if moving || takes_axes || length.is_some() {
             words.take(letter);
         }
     }
@@ -343,6 +425,7 @@ pub(crate) fn interpret(
             todo.push(Action::Sync);
             todo.push(Action::End);
             next.motion = 1;
+            next.inverse_time = false;
             next.plane = 17;
             next.incremental = false;
             next.system = 0;

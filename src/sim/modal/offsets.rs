@@ -38,7 +38,7 @@ pub(super) fn set_system(
             next.systems[index][k] = if l == 2.0 {
                 value * unit
             } else {
-                next.position[k] - next.g92[k] - value * unit
+                next.position[k] - next.g92[k] - next.tool_offset(k) - value * unit
             };
         }
     }

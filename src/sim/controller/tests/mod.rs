@@ -5,6 +5,7 @@ mod hands;
 mod manners;
 mod memory;
 mod pace;
+mod probe;
 mod table;
 mod torch;
 
