@@ -370,6 +370,8 @@ fn the_verbs_say_what_they_did() {
     let job =
         "; kagome\nG21 G90 G54\nM5\nG0 X10 Y20\nM4 S500\nG1 X60 Y20 F1200\nG1 X60 Y50\nM5\nM2\n";
     std::fs::write(folder.path().join("job.nc"), job).unwrap();
+    let far = job.replace("X60", "X650");
+    std::fs::write(folder.path().join("far.nc"), far).unwrap();
     std::fs::write(folder.path().join("empty.nc"), "G21\nM2\n").unwrap();
     for (code, line, words) in [
         (0, "status --port sim", "the beam is off"),
@@ -389,6 +391,11 @@ fn the_verbs_say_what_they_did() {
             "would mark",
         ),
         (2, "frame empty.nc --port sim", "nothing to frame"),
+        (
+            1,
+            "frame far.nc --port sim --machine co2-600x400",
+            "from X10 to X650 in machine coordinates, and the machine has 0 to 600",
+        ),
         (0, "home --port sim", "homed"),
         (1, "home --port sim --machine diode-400", "$22=0"),
         (2, "jog --port sim", "name an axis"),

@@ -81,9 +81,10 @@ pub fn run(args: &FrameArgs, global: &Global, terminal: &Terminal) -> Result<(),
             args.at.job.display()
         )));
     };
-    let job = around(low, high, s, args.feed, args.times);
+    let way = around(low, high, s, args.feed, args.times);
+    let reach = JobReach::of(&way, Dialect::Laser);
     let job = Job::check(
-        job.as_bytes(),
+        way.as_bytes(),
         &machine
             .as_ref()
             .map_or_else(JobRules::default, JobRules::of),
@@ -92,6 +93,7 @@ pub fn run(args: &FrameArgs, global: &Global, terminal: &Terminal) -> Result<(),
     let port = args.at.port(machine.as_ref())?;
     let options = SendOptions {
         s_max,
+        made_for: machine.clone().map(|m| Box::new((m, reach))),
         buffer: machine
             .as_ref()
             .and_then(|m| Some(m.connection.as_ref()?.receive_buffer_bytes as usize)),
