@@ -32,11 +32,11 @@ pub struct Settings {
     pub homing: bool,
     /// `$23`: bit k set: axis k homes towards its negative end.
     pub homing_direction_mask: f64,
-    /// `$24`: slow homing rate, mm/min (kept and reported, without effect here).
+    /// `$24`: homing rate of the second, slow search, mm/min.
     pub homing_feed_mm_min: f64,
-    /// `$25`: homing rate, mm/min.
+    /// `$25`: homing rate of the first search and off the switch, mm/min.
     pub homing_seek_mm_min: f64,
-    /// `$26`: how long a switch must be closed, ms (kept and reported, without effect here).
+    /// `$26`: how long the head rests after each way of homing, ms.
     pub homing_debounce_ms: f64,
     /// `$27`: distance from the switch after homing, mm.
     pub homing_pull_off_mm: f64,
@@ -54,6 +54,8 @@ pub struct Settings {
     pub acceleration_mm_s2: [f64; 3],
     /// `$130`–`$132`: travel, mm.
     pub travel_mm: [f64; 3],
+    /// The switches that homing looks for, of X, Y and Z. Not a `$` setting.
+    pub switches: [Switch; 3],
     /// Where the sheet's surface lies, machine Z of the bed, mm: there and below the probe's contact is closed. None:
     /// nothing is ever touched. Not a `$` setting.
     pub surface_mm: Option<f64>,
@@ -93,6 +95,7 @@ impl Default for Settings {
             max_rate_mm_min: [6000.0, 6000.0, 3000.0],
             acceleration_mm_s2: [500.0; 3],
             travel_mm: [500.0, 500.0, 200.0],
+            switches: [Switch::Works; 3],
             surface_mm: None,
             receive_buffer: 128,
             planner_blocks: 15,
@@ -100,6 +103,18 @@ impl Default for Settings {
             baud: Some(115_200.0),
         }
     }
+}
+
+/// A switch at the end of an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Switch {
+    /// It closes where it should.
+    #[default]
+    Works,
+    /// It never closes: no plug, a broken wire.
+    Missing,
+    /// It is always closed.
+    Stuck,
 }
 
 /// One `$` setting: its number, value and how many decimals GRBL prints.
