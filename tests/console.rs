@@ -8,9 +8,11 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use kagome::base::progress::{Progress, Silent};
 use kagome::control::{
     Console, ConsoleError, ControllerSettings, Job, JobReach, JobRules, JogTo, MachineState, Move,
-    SendOptions, Transport as _, send, work_mm,
+    SendOptions, Survey, Transport as _, send, work_mm,
 };
-use kagome::sim::{Controller, Settings, SimTransport};
+use kagome::gcode::Dialect;
+use kagome::machine::Origin;
+use kagome::sim::{Controller, Flavour, Settings, SimTransport};
 
 /// Interrupts when it has been asked so often.
 struct After(AtomicU32);
@@ -52,10 +54,7 @@ fn the_head_is_moved_and_told_where_it_is() {
     let status = console.set_zero([Some(5.0), Some(0.0), None]).unwrap();
     assert_eq!(work_mm(&status), Some([5.0, 0.0, 0.0]));
     let told = console.told().unwrap();
-    assert!(
-        told.offsets
-            .contains(&("G54".into(), vec![25.0, 20.0, 0.0]))
-    );
+    assert_eq!(told.offsets.get("G54"), Some(&[25.0, 20.0, 0.0][..]));
     let to = |to: JogTo, x: f64| Move {
         to,
         axes_mm: [Some(x), None, None],
@@ -168,7 +167,7 @@ fn a_job_is_read_by_the_controller_without_motion() {
     let good = "G21 G90 G54\nM5\nG0 X10 Y10\nM4 S500\nG1 X60 F1200\nM5\nM2\n";
     // The sender's own check does not know how far an arc's ends may differ; the controller does.
     let bad = good.replace("G1 X60 F1200", "G1 X60 F1200\nG2 X70 Y10 I50 J3");
-    for flavour in [kagome::sim::Flavour::Grbl, kagome::sim::Flavour::GrblHal] {
+    for flavour in [Flavour::Grbl, Flavour::GrblHal] {
         let mut line = machine(Settings {
             flavour,
             ..Settings::default()
@@ -190,43 +189,51 @@ fn a_job_is_read_by_the_controller_without_motion() {
 fn a_job_that_would_leave_the_travel_is_not_begun() {
     let text = "G21 G90 G54\nM5\nG0 X10 Y10\nM4 S500\nG1 X60 F1200\nM5\nM2\n";
     let job = Job::check(text.as_bytes(), &JobRules::default()).unwrap();
-    let mut profile = kagome::machine::load("co2-600x400").unwrap();
-    profile.motion.rate_mm_per_min.x = 1234.0;
-    let options = SendOptions {
-        made_for: Some(Box::new((profile, JobReach::of(text)))),
-        ..SendOptions::default()
-    };
-    let homed = || {
-        let mut line = machine(Settings {
-            homing: true,
-            ..Settings::default()
-        });
-        Console::open(&mut line, &Silent).unwrap().home().unwrap();
-        line
-    };
-    let mut line = homed();
-    let error = send(&mut line, &job, &options, &Silent)
-        .unwrap_err()
-        .to_string();
-    assert!(
-        error.contains("kagome zero") && error.contains("Nothing was sent"),
-        "{error}"
-    );
-    dark(&line);
-    // With the zero where the sheet lies it is.
-    let mut line = homed();
-    let mut console = Console::open(&mut line, &Silent).unwrap();
-    let away = Move {
-        to: JogTo::Machine,
-        axes_mm: [Some(-400.0), Some(-400.0), None],
-        feed_mm_per_min: 6000.0,
-    };
-    console.jog(&away).unwrap();
-    console.set_zero([Some(0.0), Some(0.0), None]).unwrap();
-    let told = Notes::default();
-    send(&mut line, &job, &options, &told).unwrap();
-    let told = told.0.into_inner().unwrap();
-    assert!(told.iter().any(|t| t.contains("rate of X")), "{told:?}");
+    // FluidNC has its travel in a file of its own, and tells it too.
+    for (profile, flavour) in [
+        ("co2-600x400", Flavour::Grbl),
+        ("diode-400-fluidnc", Flavour::FluidNc),
+    ] {
+        let mut profile = kagome::machine::load(profile).unwrap();
+        profile.motion.rate_mm_per_min.x = 1234.0;
+        let options = SendOptions {
+            made_for: Some(Box::new((profile, JobReach::of(text, Dialect::Laser)))),
+            buffer: Some(128),
+            ..SendOptions::default()
+        };
+        let homed = || {
+            let settings = Settings {
+                homing: true,
+                ..Settings::default()
+            };
+            let mut line = machine(settings.with_flavour(flavour));
+            Console::open(&mut line, &Silent).unwrap().home().unwrap();
+            line
+        };
+        let mut line = homed();
+        let error = send(&mut line, &job, &options, &Silent)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("kagome zero") && error.contains("Nothing was sent"),
+            "{error}"
+        );
+        dark(&line);
+        // With the zero where the sheet lies it is.
+        let mut line = homed();
+        let mut console = Console::open(&mut line, &Silent).unwrap();
+        let away = Move {
+            to: JogTo::Machine,
+            axes_mm: [Some(-400.0), Some(-400.0), None],
+            feed_mm_per_min: 6000.0,
+        };
+        console.jog(&away).unwrap();
+        console.set_zero([Some(0.0), Some(0.0), None]).unwrap();
+        let told = Notes::default();
+        send(&mut line, &job, &options, &told).unwrap();
+        let told = told.0.into_inner().unwrap();
+        assert!(told.iter().any(|t| t.contains("rate of X")), "{told:?}");
+    }
 }
 
 /// Keeps what it is told.
@@ -260,6 +267,90 @@ fn silence_and_strangers_are_told_by_name() {
 }
 
 #[test]
+fn the_machine_that_is_built_in_is_set_as_its_profile_says() {
+    let mut seen = 0;
+    for (name, _) in kagome::machine::shipped() {
+        let profile = kagome::machine::load(name).unwrap();
+        if !profile.controller.is_streamed() {
+            continue;
+        }
+        let output = Command::new(env!("CARGO_BIN_EXE_kagome"))
+            .env("KAGOME_PROFILES", "")
+            .args(["status", "--port", "sim", "--json", "--machine", name])
+            .output()
+            .unwrap();
+        let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(told["differs"], serde_json::json!([]), "{name}");
+        assert_eq!(told["state"], "Idle", "{name}");
+        assert_eq!(told["work_mm"], serde_json::json!([0.0, 0.0, 0.0]));
+        seen += 1;
+    }
+    assert!(seen > 4, "{seen}");
+}
+
+#[test]
+fn a_homed_machine_counts_as_its_profile_does_and_keeps_to_its_travel() {
+    for (name, _) in kagome::machine::shipped() {
+        let mut profile = kagome::machine::load(name).unwrap();
+        if !(profile.controller.is_streamed() && profile.homing.enabled) {
+            continue;
+        }
+        for origin in [
+            Origin::FrontLeft,
+            Origin::FrontRight,
+            Origin::RearLeft,
+            Origin::RearRight,
+        ] {
+            profile.bed.origin = origin;
+            let reach = profile.reach();
+            let mut line = machine(Settings::of_machine(&profile));
+            let mut console = Console::open(&mut line, &Silent).unwrap();
+            assert_eq!(console.first.state, MachineState::Alarm);
+            let status = console.home().unwrap();
+            assert_eq!(work_mm(&status), Some([0.0; 3]));
+            let mut to = |x: f64, y: f64| {
+                console.jog(&Move {
+                    to: JogTo::Work,
+                    axes_mm: [Some(x), Some(y), None],
+                    feed_mm_per_min: 6000.0,
+                })
+            };
+            for (x, y) in [reach.min, reach.max].map(<(f64, f64)>::from) {
+                let status = to(x, y).unwrap();
+                assert_eq!(work_mm(&status), Some([x, y, 0.0]), "{name} {origin:?}");
+            }
+            for (x, y) in [(reach.min[0] - 0.1, 0.0), (0.0, reach.max[1] + 0.1)] {
+                assert!(to(x, y).is_err(), "{name} {origin:?}");
+            }
+            dark(&line);
+        }
+    }
+}
+
+#[test]
+fn the_travel_of_fluidnc_is_known_from_its_file() {
+    let profile = kagome::machine::load("diode-400-fluidnc").unwrap();
+    let mut line = machine(Settings::of_machine(&profile));
+    let mut console = Console::open(&mut line, &Silent).unwrap();
+    console.home().unwrap();
+    let mut replies = Vec::new();
+    for question in Survey::TRAVEL_OF_FILE {
+        replies.extend(console.ask(question).unwrap());
+    }
+    let job = "G21 G90\nM4 S500\nG0 X10 Y10\nG1 X390 Y390 F1200\nM5\n";
+    let reach = JobReach::of(job, Dialect::Laser).unwrap();
+    let refused = |x_mm: f64| {
+        let mut survey = Survey::default();
+        survey.travel_of_file(&replies, &reach, [x_mm, 0.0, 0.0]);
+        survey.refused.len()
+    };
+    assert_eq!(
+        [-11.0, -10.0, 0.0, 10.0, 11.0].map(refused),
+        [1, 0, 0, 0, 1]
+    );
+}
+
+#[test]
 fn the_verbs_say_what_they_did() {
     let folder = tempfile::tempdir().unwrap();
     let run = |line: &str| {
@@ -279,10 +370,13 @@ fn the_verbs_say_what_they_did() {
     let job =
         "; kagome\nG21 G90 G54\nM5\nG0 X10 Y20\nM4 S500\nG1 X60 Y20 F1200\nG1 X60 Y50\nM5\nM2\n";
     std::fs::write(folder.path().join("job.nc"), job).unwrap();
+    let far = job.replace("X60", "X650");
+    std::fs::write(folder.path().join("far.nc"), far).unwrap();
     std::fs::write(folder.path().join("empty.nc"), "G21\nM2\n").unwrap();
     for (code, line, words) in [
         (0, "status --port sim", "the beam is off"),
-        (0, "jog --port sim --x 12.5 --y -3", "X12.500 Y-3.000"),
+        (0, "jog --port sim --x 12.5 --y 3", "X12.500 Y3.000"),
+        (1, "jog --port sim --x 12.5 --y -3", "$131"),
         (0, "zero --port sim", "zero is set"),
         (0, "frame job.nc --port sim", "X10 Y20 to X60 Y50, dark"),
         (
@@ -297,7 +391,13 @@ fn the_verbs_say_what_they_did() {
             "would mark",
         ),
         (2, "frame empty.nc --port sim", "nothing to frame"),
-        (1, "home --port sim", "$22=0"),
+        (
+            1,
+            "frame far.nc --port sim --machine co2-600x400",
+            "from X10 to X650 in machine coordinates, and the machine has 0 to 600",
+        ),
+        (0, "home --port sim", "homed"),
+        (1, "home --port sim --machine diode-400", "$22=0"),
         (2, "jog --port sim", "name an axis"),
         (2, "status", "--port"),
         (
@@ -318,7 +418,7 @@ fn the_verbs_say_what_they_did() {
         (
             0,
             "settings restore a.txt --port sim --machine diode-400 --yes",
-            "4 setting(s) written",
+            "7 setting(s) written",
         ),
         (2, "settings restore job.nc --port sim --yes", "job.nc:2"),
     ] {

@@ -158,16 +158,16 @@ fn what_fits_makes_a_verified_job_and_what_does_not_is_refused() {
                 "{pair}"
             );
             if machine.controller.is_streamed() {
-                let rules = JobRules {
-                    line_limit: machine.line_limit(),
-                    ..JobRules::default()
-                };
+                let rules = JobRules::of(&machine);
                 let settings = Settings::of_machine(&machine);
                 let run = rehearse(text.as_bytes(), &settings, &rules, &Silent).unwrap();
-                assert_eq!(
-                    (run.summary.rapid_burn_mm, run.summary.standing_burn_s),
-                    (0.0, 0.0)
-                );
+                assert_eq!(run.summary.rapid_burn_mm, 0.0, "{pair}");
+                let standing = run.burns.iter().filter(|b| b.standing());
+                let longest_s = standing.map(|b| b.end_s - b.start_s).fold(0.0, f64::max);
+                // A torch stands to pierce.
+                let pierce_s = material.cut_for(&machine).unwrap().torch;
+                let allowed_s = pierce_s.map_or(0.0, |t| t.pierce_delay_s + 1.0);
+                assert!(longest_s <= allowed_s, "{pair}: {longest_s} s");
                 let burnt = run.summary.burnt_mm / verdict.burnt_mm;
                 assert!((0.99..1.001).contains(&burnt), "{pair}: {burnt}");
             }

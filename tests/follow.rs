@@ -225,3 +225,24 @@ fn g_code_of_other_programs_is_followed_or_refused_with_its_line() {
         assert_eq!(error.line, line, "{text}: {error}");
     }
 }
+
+/// Waiting for a proof, a slow host or the person, the head stands at the end of what it was sent, for as many reports as
+/// it takes; and somewhere else it is astray.
+#[test]
+fn a_head_that_waits_at_the_end_of_its_lines_is_not_astray() {
+    let job = checked("G21G90\nM4S500\nG0X5Y5\nG1X9F900\nG0X20\nG1X29\nM5\nG0X0Y0\n");
+    let cuts = Cuts::of(&job).unwrap();
+    for (sent, at) in [(4, [9.0, 5.0]), (8, [0.0, 0.0])] {
+        let mut follower = Follower::new(&cuts, Some([0.0; 2]), 0.02);
+        follower.rested(sent);
+        for _ in 0..5 {
+            assert_eq!(follower.sighted(at, sent), Sighting::OnTheWay);
+        }
+        assert_eq!(
+            follower.proven(),
+            cuts.iter().filter(|c| c.last_line < sent).count()
+        );
+        let away = follower.sighted([at[0] + 3.0, at[1]], sent);
+        assert!(matches!(away, Sighting::Astray { by_mm } if (by_mm - 3.0).abs() < 1e-9));
+    }
+}

@@ -2,9 +2,15 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
 
-use kagome::base::progress::Silent;
+use std::collections::VecDeque;
+use std::sync::Mutex;
+use std::time::Duration;
+
+use kagome::base::progress::{Progress, Silent};
 use kagome::control::journal::{Header, Journal, MemoryStore};
-use kagome::control::{Cuts, Job, JobRules, SendOptions, Streaming, send, send_recorded};
+use kagome::control::{
+    Cuts, Glance, Job, JobRules, Operator, SendOptions, Streaming, Transport, send, send_recorded,
+};
 use kagome::machine;
 use kagome::sim::{Controller, Settings, SimTransport, estimate};
 
@@ -14,7 +20,7 @@ fn checked(text: &str) -> Job {
 
 /// Seconds that a job takes with at most so many unconfirmed cuts; without a limit if none.
 fn time_s(job: &Job, settings: &Settings, ahead: Option<usize>) -> f64 {
-    let mut link = SimTransport::new(Controller::new(settings.clone()));
+    let mut link = SimTransport::new(Controller::homed_at_zero(settings.clone()));
     let options = SendOptions {
         buffer: Some(settings.receive_buffer),
         ..SendOptions::default()
@@ -147,4 +153,151 @@ fn lines_go_out_as_fast_as_the_firmware_reads_them() {
     );
     assert!(recorded <= least.max(best) / 0.98);
     assert!(answered.time_s > 1.2 * counted);
+}
+
+/// A controller whose reports are of no use while it moves.
+#[derive(Clone, Copy, Debug)]
+enum Coarse {
+    /// They tell where it stood last.
+    OldWhileMoving,
+    /// They tell whole millimetres.
+    WholeMillimetres,
+    /// The same, with decimals that mean nothing.
+    FalseDecimals,
+}
+
+struct CoarseLine<'a> {
+    link: &'a Mutex<SimTransport>,
+    coarse: Coarse,
+    line: Vec<u8>,
+    ready: VecDeque<u8>,
+    last: String,
+}
+
+impl CoarseLine<'_> {
+    fn spoil(&mut self) -> String {
+        let line = String::from_utf8(std::mem::take(&mut self.line)).unwrap();
+        let Some((before, rest)) = line.split_once("MPos:") else {
+            return line;
+        };
+        let (place, after) = rest.split_once('|').unwrap();
+        let told = match self.coarse {
+            Coarse::OldWhileMoving if before.starts_with("<Run") => self.last.clone(),
+            Coarse::OldWhileMoving => place.to_owned(),
+            Coarse::WholeMillimetres | Coarse::FalseDecimals => {
+                let decimals = 3 * usize::from(matches!(self.coarse, Coarse::FalseDecimals));
+                let rounded = place.split(',').map(|v| v.parse::<f64>().unwrap().round());
+                rounded
+                    .map(|v| format!("{v:.decimals$}"))
+                    .collect::<Vec<_>>()
+                    .join(",")
+            }
+        };
+        self.last.clone_from(&told);
+        format!("{before}MPos:{told}|{after}")
+    }
+}
+
+impl Transport for CoarseLine<'_> {
+    fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+        self.link.lock().unwrap().send(bytes)
+    }
+    fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> std::io::Result<usize> {
+        if self.ready.is_empty() {
+            let mut heard = [0; 256];
+            let n = self.link.lock().unwrap().receive(&mut heard, wait)?;
+            for byte in &heard[..n] {
+                self.line.push(*byte);
+                if *byte == b'\n' {
+                    let line = self.spoil();
+                    self.ready.extend(line.bytes());
+                }
+            }
+        }
+        let n = buffer.len().min(self.ready.len());
+        for (into, byte) in buffer.iter_mut().zip(self.ready.drain(..n)) {
+            *into = byte;
+        }
+        Ok(n)
+    }
+    fn now(&self) -> Duration {
+        self.link.lock().unwrap().now()
+    }
+    fn name(&self) -> &str {
+        "a coarse controller"
+    }
+}
+
+/// Sees that no cut counts before it is made.
+struct Truth<'a>(&'a Mutex<SimTransport>);
+
+impl Progress for Truth<'_> {}
+impl Operator for Truth<'_> {
+    fn glance(&self, glance: &Glance<'_>) {
+        let link = self.0.lock().unwrap();
+        let machine = link.controller();
+        let made = machine.burns().len() - usize::from(machine.beam_on());
+        assert!(glance.cuts <= made, "{} proven, {made} made", glance.cuts);
+    }
+}
+
+/// Where reports are too coarse to prove cuts by the way, the machine is let come to rest, and that proves them: as exact as
+/// a dwell (`G4 P0.01`) behind every so many cuts would be, and cheaper.
+#[test]
+fn coarse_reports_cost_time_and_no_proof() {
+    for feed in [1500, 6000] {
+        let text = sheet(0, 200, feed);
+        let job = checked(&text);
+        let cuts = Cuts::of(&job).unwrap();
+        let settings = Settings::default();
+        let free = time_s(&job, &settings, None);
+        for ahead in [1usize, 3, 10] {
+            let mut dwelling = String::new();
+            let mut k = 0;
+            for line in text.lines() {
+                dwelling.push_str(line);
+                dwelling.push('\n');
+                if line.contains('S') && line.starts_with("G1") {
+                    k += 1;
+                    if k % ahead == 0 {
+                        dwelling.push_str("G4P0.01\n");
+                    }
+                }
+            }
+            let dwells = time_s(&checked(&dwelling), &settings, None);
+            for coarse in [
+                Coarse::OldWhileMoving,
+                Coarse::WholeMillimetres,
+                Coarse::FalseDecimals,
+            ] {
+                let link = Mutex::new(SimTransport::new(Controller::new(settings.clone())));
+                let mut line = CoarseLine {
+                    link: &link,
+                    coarse,
+                    line: Vec::new(),
+                    ready: VecDeque::new(),
+                    last: "0.000,0.000,0.000".into(),
+                };
+                let header = Header::of(&job, &cuts, "job.nc", "", ahead);
+                let mut journal = Journal::new(header, MemoryStore::default());
+                let report = send_recorded(
+                    &mut line,
+                    &job,
+                    &cuts,
+                    &SendOptions::default(),
+                    &Truth(&link),
+                    &mut journal,
+                )
+                .unwrap();
+                assert_eq!(report.cuts, cuts.len());
+                // As few seconds as dwells would cost, and a tenth more.
+                assert!(report.time_s < 1.1 * dwells, "{} {dwells}", report.time_s);
+                println!(
+                    "F{feed}, {coarse:?}, at most {ahead}: at rest {:+.1} %, dwells {:+.1} %",
+                    100.0 * (report.time_s / free - 1.0),
+                    100.0 * (dwells / free - 1.0)
+                );
+            }
+        }
+    }
 }

@@ -164,7 +164,7 @@ fn nothing_is_cut_while_it_is_not_known_where_the_head_stands() {
             })
             .unwrap_err();
         assert!(matches!(error, SendError::NotReady { .. }), "{error}");
-        assert_eq!(asked[0], Question::ZeroHere);
+        assert_eq!(asked[0], Question::ZeroHere { torch: false });
         assert_eq!(asked.len(), yes + 1);
         if yes == 1 {
             let Question::AtReference { cut, is_cut, at_mm } = asked[1] else {

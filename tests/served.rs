@@ -190,7 +190,7 @@ fn a_locked_machine_is_homed_and_what_happens_to_it_is_seen_by_the_client() {
     assert!(said.contains("ok"), "{said}");
     line.send(b"?").unwrap();
     let said = line.until(">");
-    assert!(said.contains("<Idle|MPos:-1.000,-1.000"), "{said}");
+    assert!(said.contains("<Idle|MPos:0.000,0.000,0.000"), "{said}");
     let said = line.until("to unlock");
     let (alarm, banner) = (said.find("ALARM:1"), said.find("Grbl 1.1h"));
     assert!(alarm.is_some() && alarm < banner, "{said}");

@@ -1,6 +1,7 @@
 //! What a person sees and presses while a job runs: one line that is redrawn on a terminal, plain lines elsewhere, or events
 //! as JSON, a line each, for other programs.
 
+use std::collections::VecDeque;
 use std::sync::Mutex;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -10,10 +11,10 @@ use crossterm::terminal::{disable_raw_mode, enable_raw_mode};
 use serde_json::json;
 
 use super::Terminal;
+use super::timetable::Timetable;
 use crate::base::progress::Progress;
 use crate::base::units::short;
-use crate::control::{Change, Glance, Job, Operator, Wish};
-use crate::sim::{Settings, estimate};
+use crate::control::{Change, Glance, Operator, Wish};
 
 /// Between two pictures of the line, on the machine's clock.
 const REDRAW: Duration = Duration::from_millis(200);
@@ -30,65 +31,6 @@ const BAR: usize = 20;
 /// The keys, in words.
 const KEYS: &str = "p pause  +/- feed  ]/[ power  0 as made  a end";
 
-/// When each part of a job is done, by the planner.
-#[derive(Default)]
-pub(super) struct Timetable {
-    /// Lines of the job, and the time at which they are done, s; ascending.
-    at: Vec<(usize, f64)>,
-}
-
-impl Timetable {
-    /// Of a job on a machine; empty if the controller would not take it.
-    pub fn of(job: &Job, settings: &Settings) -> Self {
-        let lines: Vec<&str> = job.lines().map(|(text, _)| text).collect();
-        // A long job has few points: each is an estimate of its own.
-        let points = (400_000 / lines.len().max(1)).clamp(4, 32);
-        let done = |point: usize| {
-            let count = lines.len() * point / points;
-            let time = estimate(&lines[..count].join("\n"), settings).ok()?.time_s;
-            Some((count, time))
-        };
-        let at: Option<Vec<_>> = (0..=points).map(done).collect();
-        Self {
-            at: at.unwrap_or_default(),
-        }
-    }
-
-    /// The time of the whole job, s.
-    pub fn whole_s(&self) -> f64 {
-        self.at.last().map_or(0.0, |p| p.1)
-    }
-
-    /// When so many lines are done, s.
-    pub fn done_s(&self, lines: usize) -> f64 {
-        let next = self.at.partition_point(|p| p.0 < lines);
-        match (
-            next.checked_sub(1).and_then(|k| self.at.get(k)),
-            self.at.get(next),
-        ) {
-            (Some(a), Some(b)) => {
-                a.1 + (b.1 - a.1) * (lines - a.0) as f64 / (b.0 - a.0).max(1) as f64
-            }
-            (None, Some(first)) => first.1,
-            (_, None) => self.whole_s(),
-        }
-    }
-
-    /// How long the rest takes, s, when `lines` are done after `elapsed_s` with the machine at work: at the pace so far once
-    /// there is one.
-    pub fn left_s(&self, lines: usize, elapsed_s: f64) -> f64 {
-        // Feed overrides change the pace; the first seconds say nothing.
-        const SETTLED_S: f64 = 20.0;
-        let done = self.done_s(lines);
-        let pace = if done > SETTLED_S {
-            (elapsed_s / done).clamp(0.3, 10.0)
-        } else {
-            1.0
-        };
-        pace * (self.whole_s() - done).max(0.0)
-    }
-}
-
 /// How it is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Show {
@@ -100,6 +42,35 @@ pub(super) enum Show {
     Events,
     /// Nothing but remarks.
     Nothing,
+}
+
+/// Feed, rapids and power, per cent of what the job says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Overrides {
+    feed: u16,
+    rapids: u16,
+    power: u16,
+}
+
+impl Overrides {
+    const AS_MADE: Self = Self {
+        feed: 100,
+        rapids: 100,
+        power: 100,
+    };
+
+    /// What is not as the job was made; empty if all of it is.
+    fn words(self) -> String {
+        [
+            ("feed", self.feed),
+            ("rapids", self.rapids),
+            ("power", self.power),
+        ]
+        .into_iter()
+        .filter(|(_, percent)| *percent != 100)
+        .map(|(what, percent)| format!("  {what} {percent} %"))
+        .collect()
+    }
 }
 
 #[derive(Default)]
@@ -114,9 +85,10 @@ struct State {
     /// The key that ends the job was pressed once.
     end_asked: bool,
     step: usize,
-    /// Job without overrides, as far as keys changed them, per cent.
-    feed: i32,
-    power: i32,
+    /// As the controller told them last, or as keys have asked since; none before either.
+    overrides: Option<Overrides>,
+    /// Wishes of one key, still to be passed on.
+    wishes: VecDeque<Wish>,
 }
 
 /// The person's side of a running job.
@@ -133,11 +105,7 @@ impl<'a> Desk<'a> {
             terminal,
             show,
             times,
-            state: Mutex::new(State {
-                feed: 100,
-                power: 100,
-                ..State::default()
-            }),
+            state: Mutex::new(State::default()),
         }
     }
 
@@ -188,19 +156,15 @@ impl<'a> Desk<'a> {
             } else {
                 Wish::Pause
             }),
-            '+' | '=' => Some(changed(&mut state.feed, 10, Wish::Feed)),
-            '-' => Some(changed(&mut state.feed, -10, Wish::Feed)),
-            ']' => Some(changed(&mut state.power, 10, Wish::Power)),
-            '[' => Some(changed(&mut state.power, -10, Wish::Power)),
+            '+' | '=' => Some(changed(state, |o| &mut o.feed, 10, Wish::Feed)),
+            '-' => Some(changed(state, |o| &mut o.feed, -10, Wish::Feed)),
+            ']' => Some(changed(state, |o| &mut o.power, 10, Wish::Power)),
+            '[' => Some(changed(state, |o| &mut o.power, -10, Wish::Power)),
             '0' => {
-                // One byte at a time: the other follows with the next look.
-                if state.feed != 100 {
-                    state.feed = 100;
-                    Some(Wish::Feed(Change::Reset))
-                } else {
-                    state.power = 100;
-                    Some(Wish::Power(Change::Reset))
-                }
+                state.overrides = Some(Overrides::AS_MADE);
+                let rest = [Wish::Rapid(Change::Reset), Wish::Power(Change::Reset)];
+                state.wishes.extend(rest);
+                Some(Wish::Feed(Change::Reset))
             }
             _ => None,
         }
@@ -232,10 +196,30 @@ impl<'a> Desk<'a> {
                 clock(self.times.left_s(glance.done_lines, elapsed))
             ));
         }
-        if state.feed != 100 || state.power != 100 {
-            text.push_str(&format!("  feed {} % power {} %", state.feed, state.power));
-        }
+        text.push_str(&state.overrides.map_or_else(String::new, Overrides::words));
         format!("{text}   {KEYS}")
+    }
+
+    fn status_event(&self, glance: &Glance<'_>, state: &State) -> serde_json::Value {
+        let worked = self.worked_s(glance, state);
+        let overrides = state
+            .overrides
+            .map(|o| json!({ "feed": o.feed, "rapids": o.rapids, "power": o.power }));
+        json!({
+            "event": "status",
+            "state": format!("{:?}", glance.status.state),
+            "paused": glance.paused(),
+            "work_mm": glance.work_mm,
+            "s": glance.status.s,
+            "rate_mm_per_min": glance.status.rate_mm_min,
+            "overrides_percent": overrides,
+            "cuts": glance.cuts,
+            "of_cuts": glance.of_cuts,
+            "acknowledged": glance.acknowledged,
+            "lines": glance.lines,
+            "elapsed_s": rounded(glance.elapsed.as_secs_f64()),
+            "left_s": rounded(self.times.left_s(glance.done_lines, worked)),
+        })
     }
 
     fn worked_s(&self, glance: &Glance<'_>, state: &State) -> f64 {
@@ -249,9 +233,15 @@ impl<'a> Desk<'a> {
     }
 }
 
-/// An override that keys changed, and the wish that changes it at the machine.
-fn changed(percent: &mut i32, by: i32, wish: impl Fn(Change) -> Wish) -> Wish {
-    *percent = (*percent + by).clamp(10, 200);
+/// A key changes an override; gives the wish that changes it at the machine.
+fn changed(
+    state: &mut State,
+    which: impl Fn(&mut Overrides) -> &mut u16,
+    by: i16,
+    wish: impl Fn(Change) -> Wish,
+) -> Wish {
+    let percent = which(state.overrides.get_or_insert(Overrides::AS_MADE));
+    *percent = percent.saturating_add_signed(by).clamp(10, 200);
     wish(if by > 0 { Change::More } else { Change::Less })
 }
 
@@ -295,6 +285,10 @@ impl Operator for Desk<'_> {
         if !state.raw {
             return None;
         }
+        let rest = state.wishes.pop_front();
+        if rest.is_some() {
+            return rest;
+        }
         while event::poll(Duration::ZERO).unwrap_or(false) {
             let Ok(Event::Key(key)) = event::read() else {
                 continue;
@@ -315,7 +309,15 @@ impl Operator for Desk<'_> {
             return;
         };
         let paused = glance.paused();
-        let turned = state.paused_at.is_some() != paused;
+        let mut turned = state.paused_at.is_some() != paused;
+        if let Some([feed, rapids, power]) = glance.status.overrides {
+            let told = Some(Overrides {
+                feed,
+                rapids,
+                power,
+            });
+            turned |= std::mem::replace(&mut state.overrides, told) != told;
+        }
         match (state.paused_at, paused) {
             (None, true) => state.paused_at = Some(glance.elapsed),
             (Some(at), false) => {
@@ -349,10 +351,11 @@ impl Operator for Desk<'_> {
                         .times
                         .left_s(glance.done_lines, self.worked_s(glance, &state));
                     self.terminal.note(&format!(
-                        "{share} %: cut {} of {}, about {} left",
+                        "{share} %: cut {} of {}, about {} left{}",
                         glance.cuts,
                         glance.of_cuts,
-                        clock(left)
+                        clock(left),
+                        state.overrides.map_or_else(String::new, Overrides::words)
                     ));
                 }
             }
@@ -361,21 +364,7 @@ impl Operator for Desk<'_> {
                 if turned || new || since(EVENTS, &state) {
                     state.shown_at = Some(glance.elapsed);
                     state.cuts = glance.cuts;
-                    let worked = self.worked_s(glance, &state);
-                    self.event(&json!({
-                        "event": "status",
-                        "state": format!("{:?}", glance.status.state),
-                        "paused": paused,
-                        "work_mm": glance.work_mm,
-                        "s": glance.status.s,
-                        "rate_mm_per_min": glance.status.rate_mm_min,
-                        "cuts": glance.cuts,
-                        "of_cuts": glance.of_cuts,
-                        "acknowledged": glance.acknowledged,
-                        "lines": glance.lines,
-                        "elapsed_s": rounded(glance.elapsed.as_secs_f64()),
-                        "left_s": rounded(self.times.left_s(glance.done_lines, worked)),
-                    }));
+                    self.event(&self.status_event(glance, &state));
                 }
             }
             Show::Nothing => {}
@@ -390,60 +379,29 @@ fn rounded(seconds: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::{JobRules, MachineState, Status};
-
-    fn job() -> Job {
-        let mut text = String::from("G21 G90\nM4 S500\nF1200\n");
-        for n in 0..100 {
-            text.push_str(&format!("G0 X{n} Y0\nG1 Y20\n"));
-        }
-        text.push_str("M5\n");
-        Job::check(text.as_bytes(), &JobRules::default()).unwrap()
-    }
-
-    #[test]
-    fn the_timetable_is_the_planners() {
-        let (job, settings) = (job(), Settings::default());
-        let times = Timetable::of(&job, &settings);
-        let lines: Vec<&str> = job.lines().map(|l| l.0).collect();
-        let whole = estimate(&lines.join("\n"), &settings).unwrap().time_s;
-        assert_eq!(times.whole_s(), whole);
-        for count in [0, 3, 60, 101, lines.len()] {
-            let true_s = estimate(&lines[..count].join("\n"), &settings)
-                .unwrap()
-                .time_s;
-            let found = times.done_s(count);
-            assert!(
-                (found - true_s).abs() < 0.03 * whole,
-                "{count}: {found} {true_s}"
-            );
-        }
-        // Half as fast as planned: twice as long to go.
-        let half = lines.len() / 2;
-        let left = times.left_s(half, 2.0 * times.done_s(half));
-        assert!((left - 2.0 * (whole - times.done_s(half))).abs() < 1e-9);
-        assert_eq!(times.left_s(lines.len(), whole), 0.0);
-    }
+    use crate::cli::timetable::tests::job;
+    use crate::control::{MachineState, Status};
+    use crate::sim::Settings;
 
     #[test]
     fn keys_are_wishes_and_the_job_ends_at_the_second_asking() {
         let terminal = Terminal::new(true);
-        let desk = Desk::new(&terminal, Show::Line, Timetable { at: Vec::new() });
-        let mut state = State {
-            feed: 100,
-            power: 100,
-            ..State::default()
-        };
+        let desk = Desk::new(&terminal, Show::Line, Timetable::default());
+        let mut state = State::default();
         let press = |key: char, state: &mut State| desk.key(KeyCode::Char(key), false, state);
         assert_eq!(press('p', &mut state), Some(Wish::Pause));
         state.paused_at = Some(Duration::ZERO);
         assert_eq!(press('p', &mut state), Some(Wish::Resume));
         assert_eq!(press('+', &mut state), Some(Wish::Feed(Change::More)));
         assert_eq!(press('[', &mut state), Some(Wish::Power(Change::Less)));
-        assert_eq!((state.feed, state.power), (110, 90));
+        let keyed = state.overrides.unwrap();
+        assert_eq!((keyed.feed, keyed.rapids, keyed.power), (110, 100, 90));
         assert_eq!(press('0', &mut state), Some(Wish::Feed(Change::Reset)));
-        assert_eq!(press('0', &mut state), Some(Wish::Power(Change::Reset)));
-        assert_eq!((state.feed, state.power), (100, 100));
+        assert_eq!(
+            state.wishes.drain(..).collect::<Vec<_>>(),
+            [Wish::Rapid(Change::Reset), Wish::Power(Change::Reset)]
+        );
+        assert_eq!(state.overrides, Some(Overrides::AS_MADE));
         assert_eq!(press('a', &mut state), Some(Wish::Pause));
         assert_eq!(press('x', &mut state), None);
         // Another key in between takes it back.
@@ -453,37 +411,84 @@ mod tests {
         assert!(terminal.interrupted());
     }
 
-    #[test]
-    fn the_line_tells_what_the_machine_has_done() {
-        let terminal = Terminal::new(true);
-        let (job, settings) = (job(), Settings::default());
-        let desk = Desk::new(&terminal, Show::Line, Timetable::of(&job, &settings));
-        let status = Status {
+    fn report() -> Status {
+        Status {
             state: MachineState::Run,
             position_mm: Some([10.0, 5.0, 0.0]),
+            rounding_mm: 0.0005,
             is_work: false,
             offset_mm: None,
             rate_mm_min: None,
             s: Some(500.0),
             overrides: None,
             output_on: None,
-        };
-        let mut glance = Glance {
-            status: &status,
+        }
+    }
+
+    fn seen(status: &Status) -> Glance<'_> {
+        Glance {
+            status,
             work_mm: Some([10.0, 5.0]),
             cuts: 50,
             of_cuts: 100,
             acknowledged: 120,
-            lines: job.len(),
+            lines: 204,
             done_lines: 103,
             elapsed: Duration::from_secs(60),
+        }
+    }
+
+    #[test]
+    fn overrides_are_the_controllers_and_a_key_counts_until_it_tells_them() {
+        let terminal = Terminal::new(true);
+        let desk = Desk::new(&terminal, Show::Nothing, Timetable::default());
+        let told = |overrides: Option<[u16; 3]>| Status {
+            overrides,
+            ..report()
         };
+        let event = || desk.status_event(&seen(&report()), &desk.state.lock().unwrap());
+        let line = || desk.line(&seen(&report()), &desk.state.lock().unwrap());
+        let press = |key| desk.key(KeyCode::Char(key), false, &mut desk.state.lock().unwrap());
+        let percent = |feed: u16, rapids: u16, power: u16| json!({ "feed": feed, "rapids": rapids, "power": power });
+        desk.glance(&seen(&told(None)));
+        assert!(event()["overrides_percent"].is_null());
+        desk.glance(&seen(&told(Some([100; 3]))));
+        assert_eq!(event()["overrides_percent"], percent(100, 100, 100));
+        assert!(!line().contains("100 %"), "{}", line());
+        press('+');
+        desk.glance(&seen(&told(None)));
+        assert!(line().contains("feed 110 %"), "{}", line());
+        // It was lost on the way, and somebody turned the rapids down.
+        desk.glance(&seen(&told(Some([100, 25, 100]))));
+        assert_eq!(event()["overrides_percent"], percent(100, 25, 100));
+        assert!(
+            line().contains("rapids 25 %") && !line().contains("feed 1"),
+            "{}",
+            line()
+        );
+        // The next key counts from what is told.
+        desk.glance(&seen(&told(Some([150, 25, 80]))));
+        press('-');
+        press('[');
+        assert_eq!(event()["overrides_percent"], percent(140, 25, 70));
+    }
+
+    #[test]
+    fn the_line_tells_what_the_machine_has_done() {
+        let terminal = Terminal::new(true);
+        let (job, settings) = (job(), Settings::default());
+        let desk = Desk::new(&terminal, Show::Line, Timetable::of(&job, &settings));
+        let status = report();
+        let mut glance = seen(&status);
         let state = State {
-            feed: 110,
-            power: 100,
+            overrides: Some(Overrides {
+                feed: 110,
+                ..Overrides::AS_MADE
+            }),
             ..State::default()
         };
         let line = desk.line(&glance, &state);
+        assert!(!line.contains("power 1"), "{line}");
         for part in [
             "cut 50 of 100",
             "X10.0 Y5.0",

@@ -15,24 +15,24 @@ use crate::machine::{self, Machine};
 use crate::sim::{Controller, Settings, SimTransport};
 
 /// The name of the machine that is built in.
-pub(super) const SIM: &str = "sim";
+const SIM: &str = "sim";
 
 /// What GRBL boards use unless they were built otherwise.
-pub(super) const STANDARD_BAUD: u32 = 115_200;
+const STANDARD_BAUD: u32 = 115_200;
 
-/// Where the machine is.
+/// Which machine, and where it is.
 #[derive(Args, Clone, Debug)]
 pub struct PortArgs {
     /// The machine's port (see `kagome ports`): a path, usb:VID:PID, tcp://HOST:PORT, or sim for the machine that is built
     /// in [default: the one that this machine was on last]
     #[arg(long)]
-    pub(super) port: Option<String>,
+    port: Option<String>,
     /// The machine's profile
     #[arg(long, value_name = "NAME|FILE", default_value = crate::machine::DEFAULT)]
-    pub(super) machine: String,
+    machine: String,
     /// Rate of the serial line [default: the profile's]
     #[arg(long)]
-    pub(super) baud: Option<u32>,
+    baud: Option<u32>,
 }
 
 impl PortArgs {
@@ -49,72 +49,95 @@ impl PortArgs {
         )))
     }
 
-    /// Opens the line.
-    pub(super) fn open(&self) -> Result<Box<dyn Transport>, Failure> {
-        let machine = self.profile()?;
-        open(
-            &port_of(self.port.as_deref(), Some(&machine.name))?,
-            self.baud,
-            Some(&machine),
-        )
-    }
-
-    /// Keeps the port for the next time.
-    pub(super) fn remember(&self, terminal: &Terminal) {
-        if let (Some(port), Ok(machine)) = (&self.port, self.profile()) {
-            remember(port, &machine.name, terminal);
-        }
+    /// Where it is.
+    pub(super) fn port(&self, machine: &Machine) -> Result<Port, Failure> {
+        Port::of(self.port.as_deref(), self.baud, Some(machine))
     }
 }
 
-/// The port that is asked for, else the one that this machine was on last.
-pub(super) fn port_of(asked: Option<&str>, machine: Option<&str>) -> Result<String, Failure> {
-    if let Some(port) = asked {
-        return Ok(port.to_owned());
-    }
-    let last = machine.and_then(|name| Book::read().0.remove(name));
-    match last {
-        Some(last) => Ok(last.name(&ports())),
-        None => Err(Failure::Bad(
-            "where is the machine? Name its port with --port (`kagome ports` lists them); it is remembered then".into(),
-        )),
-    }
-}
-
-/// Opens a port by its name.
-pub(super) fn open(
-    port: &str,
+/// The port that is asked for, else the one that the machine was on last.
+#[derive(Debug)]
+pub(super) struct Port {
+    name: String,
     baud: Option<u32>,
-    machine: Option<&Machine>,
-) -> Result<Box<dyn Transport>, Failure> {
-    if port == SIM {
-        let settings = machine.map_or_else(Settings::default, Settings::of_machine);
-        return Ok(Box::new(SimTransport::new(Controller::new(settings))));
-    }
-    let connection = machine.and_then(|m| m.connection.as_ref());
-    let baud = baud.or(connection.map(|c| c.baud)).unwrap_or(STANDARD_BAUD);
-    let line = OpenPort::open(port, baud).map_err(Failure::bad)?;
-    Ok(Box::new(line))
+    /// It was asked for, and is to be remembered.
+    asked: bool,
 }
 
-/// Keeps a port that worked for the next time. What cannot be kept is no reason to fail.
-pub(super) fn remember(port: &str, machine: &str, terminal: &Terminal) {
-    if port == SIM {
-        return;
+impl Port {
+    pub fn of(
+        asked: Option<&str>,
+        baud: Option<u32>,
+        machine: Option<&Machine>,
+    ) -> Result<Self, Failure> {
+        let last = || Some(Book::read().0.remove(&machine?.name)?.name(&ports()));
+        let name = asked.map(str::to_owned).or_else(last).ok_or_else(|| {
+            Failure::Bad("where is the machine? Name its port with --port (`kagome ports` lists them); it is remembered then".into())
+        })?;
+        Ok(Self {
+            name,
+            baud,
+            asked: asked.is_some(),
+        })
     }
-    let known = ports();
-    let kind = known.iter().find(|(name, _)| name == port);
-    let last = Last {
-        port: port.to_owned(),
-        usb: kind.and_then(|(_, kind)| usb_name(kind)),
-    };
-    let mut book = Book::read();
-    if book.0.get(machine) == Some(&last) {
-        return;
+
+    /// Whether it is the machine that is built in.
+    pub fn is_sim(&self) -> bool {
+        self.name == SIM
     }
-    book.0.insert(machine.to_owned(), last);
-    if let Err(problem) = book.write() {
-        terminal.note(&format!("the port is not remembered: {problem}"));
+
+    /// Opens it and does something over it that must be brought to its end. While that lasts no number of Ctrl-C ends the
+    /// program, each asks for the stop that belongs to what is being done; from the opening on, which resets most boards: an
+    /// exit in between would leave them to themselves.
+    pub fn open<T>(
+        &self,
+        machine: Option<&Machine>,
+        terminal: &Terminal,
+        work: impl FnOnce(&mut dyn Transport) -> T,
+    ) -> Result<T, Failure> {
+        let Some(guard) = terminal.forbid_exit() else {
+            return Err(Failure::Bad(
+                "Ctrl-C cannot be caught here, so what runs could not be stopped with proof; nothing was sent".into(),
+            ));
+        };
+        let mut line = self.line(machine)?;
+        let done = work(line.as_mut());
+        drop(guard);
+        terminal.clear();
+        Ok(done)
+    }
+
+    fn line(&self, machine: Option<&Machine>) -> Result<Box<dyn Transport>, Failure> {
+        if self.is_sim() {
+            let settings = machine.map_or_else(Settings::default, Settings::of_machine);
+            let controller = Controller::homed_at_zero(settings);
+            return Ok(Box::new(SimTransport::new(controller)));
+        }
+        let connection = machine.and_then(|m| m.connection.as_ref());
+        let baud = self.baud.or(connection.map(|c| c.baud));
+        let line = OpenPort::open(&self.name, baud.unwrap_or(STANDARD_BAUD));
+        Ok(Box::new(line.map_err(Failure::bad)?))
+    }
+
+    /// Keeps one that was asked for and has worked for the next time. What cannot be kept is no reason to fail.
+    pub fn remember(&self, machine: Option<&Machine>, terminal: &Terminal) {
+        let Some(machine) = machine.filter(|_| self.asked && !self.is_sim()) else {
+            return;
+        };
+        let known = ports();
+        let kind = known.iter().find(|(name, _)| *name == self.name);
+        let last = Last {
+            port: self.name.clone(),
+            usb: kind.and_then(|(_, kind)| usb_name(kind)),
+        };
+        let mut book = Book::read();
+        if book.0.get(&machine.name) == Some(&last) {
+            return;
+        }
+        book.0.insert(machine.name.clone(), last);
+        if let Err(problem) = book.write() {
+            terminal.note(&format!("the port is not remembered: {problem}"));
+        }
     }
 }
 

@@ -4,9 +4,8 @@ use std::io::IsTerminal as _;
 
 use clap::Args;
 
-use super::port_args::SIM;
+use super::question::agrees;
 use super::send::{JobArgs, prepare, print};
-use super::terminal::agrees;
 use super::{Failure, Global, Terminal};
 use crate::base::progress::Progress as _;
 use crate::control::journal::{self, FileStore, Journal};
@@ -38,7 +37,7 @@ impl ResumeArgs {
     fn answer(&self, question: &Question, terminal: &Terminal) -> bool {
         let (given, flag) = match question {
             Question::Home => (self.home, "--home"),
-            Question::ZeroHere => (self.zero_here, "--zero-here"),
+            Question::ZeroHere { .. } => (self.zero_here, "--zero-here"),
             Question::AtReference { .. } => (self.at_reference, "--at-reference"),
         };
         if given {
@@ -59,7 +58,7 @@ impl ResumeArgs {
 pub fn run(args: &ResumeArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
     let what = &args.what;
     let ready = prepare(what, terminal)?;
-    if ready.port == SIM {
+    if ready.port.is_sim() {
         return Err(Failure::Bad(
             "the machine that is built in forgets its sheet when the program ends: there is nothing to resume. `kagome sim` serves one that stays".into(),
         ));
@@ -69,14 +68,14 @@ pub fn run(args: &ResumeArgs, global: &Global, terminal: &Terminal) -> Result<()
             "the head cannot be followed through this job ({why}), so nobody can say where it was stopped"
         ))
     })?;
-    let path = journal::path_for(&what.job);
+    let path = journal::path_for(&what.at.job);
     let here = |why: String| Failure::Bad(format!("{}: {why}. Nothing was sent", path.display()));
     let bytes = std::fs::read(&path).map_err(|error| {
         here(format!(
             "{error}; without its journal nobody can say what is cut. `kagome send` begins the job anew"
         ))
     })?;
-    let header = ready.header(&what.job, &cuts);
+    let header = ready.header(&what.at.job, &cuts);
     let mut journal = Journal::continued(header, &bytes, FileStore::new(&path))
         .map_err(|error| here(error.to_string()))?;
     let desk = ready.desk(global, terminal);

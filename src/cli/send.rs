@@ -1,15 +1,16 @@
 //! `kagome send`.
 
 use std::io::IsTerminal as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 
 use super::cut::drawing_of;
-use super::desk::{Desk, Show, Timetable};
-use super::port_args::{self, SIM, port_of, remember};
-use super::profiles::{machine_named, own_folder};
-use super::terminal::agrees;
+use super::desk::{Desk, Show};
+use super::job_args::JobAt;
+use super::port_args::Port;
+use super::question::agrees;
+use super::timetable::Timetable;
 use super::{Failure, Global, Terminal};
 use crate::base::progress::Progress as _;
 use crate::base::units::short;
@@ -18,7 +19,7 @@ use crate::control::{
     Awake, Console, Cuts, Job, JobReach, JobRules, SendError, SendOptions, SendReport, Streaming,
     Transport, send, send_recorded,
 };
-use crate::machine::{self, Connection, HandOver, Machine};
+use crate::machine::{Connection, HandOver, Machine};
 use crate::sim::{RehearsalError, RehearsalSummary, Settings, rehearse};
 use crate::{gcode, pattern};
 
@@ -47,18 +48,8 @@ pub struct SendArgs {
 /// A job and where it goes.
 #[derive(Args, Debug)]
 pub(super) struct JobArgs {
-    /// The job: a G-code file
-    pub job: PathBuf,
-    /// The machine's port (see `kagome ports`): a path, usb:VID:PID, tcp://HOST:PORT, or sim for the machine that is built
-    /// in [default: the one that this machine was on last]
-    #[arg(long)]
-    port: Option<String>,
-    /// The machine's profile [default: the one that the job's header names]
-    #[arg(long, value_name = "NAME|FILE")]
-    machine: Option<String>,
-    /// Rate of the serial line [default: the profile's, or 115200]
-    #[arg(long)]
-    baud: Option<u32>,
+    #[command(flatten)]
+    pub at: JobAt,
     /// Send a job that uses M3: its beam stays on if the cable is pulled. Stay beside the machine
     #[arg(long)]
     allow_constant_power: bool,
@@ -66,30 +57,6 @@ pub(super) struct JobArgs {
     /// profile's]
     #[arg(long, value_name = "S")]
     s_max: Option<f64>,
-}
-
-/// The profile asked for, else the one that the job's header names, else none: G-code of other programs may come
-/// without a profile to compare with.
-pub(super) fn machine_for(asked: Option<&str>, job: &[u8]) -> Result<Option<Machine>, Failure> {
-    if let Some(name) = asked {
-        let found = machine_named(name).map_err(Failure::bad)?;
-        return machine::load(&found).map(Some).map_err(Failure::bad);
-    }
-    let text = String::from_utf8_lossy(job);
-    let Some(named) = gcode::machine_of(&text) else {
-        return Ok(None);
-    };
-    // What a header says is no path.
-    let own = own_folder().and_then(|own| machine::own_file(&own, named));
-    if !own.is_some_and(|file| file.is_file())
-        && !machine::shipped().any(|(shipped, _)| shipped == named)
-    {
-        return Err(Failure::Bad(format!(
-            "the job was made for the machine {named}, which is neither a shipped profile nor one of your own: name its file with --machine"
-        )));
-    }
-    let found = machine_named(named).map_err(Failure::bad)?;
-    machine::load(&found).map(Some).map_err(Failure::bad)
 }
 
 /// The job must be good for the machine, and cut its sheet if the drawing lies beside it: what `verify` would say.
@@ -136,11 +103,8 @@ pub(super) struct Ready {
     pub machine: Option<Machine>,
     pub job: Job,
     pub options: SendOptions,
-    baud: Option<u32>,
     /// Where the machine is.
-    pub port: String,
-    /// It was named, and is to be remembered.
-    named: bool,
+    pub port: Port,
     reach: Option<JobReach>,
 }
 
@@ -189,10 +153,13 @@ impl Ready {
         let mut lines = Vec::new();
         let s = self.job.largest_s();
         let power = match self.options.s_max {
+            _ if self.job.is_torch() => "with the torch".into(),
             Some(s_max) => format!("up to {} % of its power", short(100.0 * s / s_max, 1)),
             None => format!("up to S{}", short(s, 1)),
         };
-        let mode = if self.job.constant_power() {
+        let mode = if self.job.is_torch() {
+            "which stays on if the link is lost: keep a hand on its switch"
+        } else if self.job.constant_power() {
             "CONSTANT (M3): it stays on if the link is lost"
         } else {
             "dynamic (M4): off whenever the head stands"
@@ -242,47 +209,32 @@ impl Ready {
         terminal: &Terminal,
         work: impl FnOnce(&mut dyn Transport) -> Result<T, SendError>,
     ) -> Result<T, Failure> {
-        // From the opening on: it resets the board, and an exit in between would leave it to itself.
-        let Some(guard) = terminal.forbid_exit() else {
-            return Err(Failure::Bad(
-                "Ctrl-C cannot be caught here, so a running job could not be stopped with proof; nothing was sent".into(),
-            ));
-        };
-        let mut line = port_args::open(&self.port, self.baud, self.machine.as_ref())?;
-        if let Some(machine) = self.machine.as_ref().filter(|_| self.named) {
-            remember(&self.port, &machine.name, terminal);
-        }
-        let awake = Awake::ask("a machine is running a job");
-        let result = work(line.as_mut());
-        drop((awake, guard));
-        terminal.clear();
+        let machine = self.machine.as_ref();
+        let result = self.port.open(machine, terminal, |line| {
+            self.port.remember(machine, terminal);
+            let _awake = Awake::ask("a machine is running a job");
+            work(line)
+        })?;
         result.map_err(failure)
     }
 }
 
 /// Reads a job and its machine's profile, and judges the one by the other.
 pub(super) fn prepare(args: &JobArgs, terminal: &Terminal) -> Result<Ready, Failure> {
-    let text = std::fs::read(&args.job).map_err(|error| {
-        Failure::Bad(format!(
-            "cannot read {}: {error}; nothing was sent",
-            args.job.display()
-        ))
-    })?;
-    let machine = machine_for(args.machine.as_deref(), &text)?;
+    let (text, machine) = args.at.read()?;
+    let path = &args.at.job;
     if let Some(m) = machine.as_ref().filter(|m| !m.controller.is_streamed()) {
         return Err(Failure::Bad(format!(
             "machine {} has {}, to which nothing is streamed: open {} there as a file. Nothing was sent",
             m.name,
             m.controller,
-            args.job.display()
+            path.display()
         )));
     }
-    let rules = JobRules {
-        allow_constant_power: args.allow_constant_power,
-        line_limit: machine
-            .as_ref()
-            .map_or(JobRules::default().line_limit, Machine::line_limit),
-    };
+    let mut rules = machine
+        .as_ref()
+        .map_or_else(JobRules::default, JobRules::of);
+    rules.allow_constant_power |= args.allow_constant_power;
     if args.s_max.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
         return Err(Failure::Bad("--s-max must be a number above zero".into()));
     }
@@ -291,9 +243,9 @@ pub(super) fn prepare(args: &JobArgs, terminal: &Terminal) -> Result<Ready, Fail
         .or(machine.as_ref().and_then(|m| Some(m.laser()?.s_max)));
     // First the plain faults, in the sender's words.
     let job = Job::check(&text, &rules)
-        .map_err(|error| Failure::Bad(format!("{}: {error}", args.job.display())))?;
+        .map_err(|error| Failure::Bad(format!("{}: {error}", path.display())))?;
     if let Some(machine) = &machine {
-        check_job(&args.job, &text, machine, args)?;
+        check_job(path, &text, machine, args)?;
         if let Some(made_for) = gcode::machine_of(&String::from_utf8_lossy(&text))
             && made_for != machine.name
         {
@@ -308,7 +260,12 @@ pub(super) fn prepare(args: &JobArgs, terminal: &Terminal) -> Result<Ready, Fail
         );
     }
     let connection = machine.as_ref().and_then(|m| m.connection.as_ref());
-    let reach = JobReach::of(&String::from_utf8_lossy(&text));
+    let reach = JobReach::of(
+        &String::from_utf8_lossy(&text),
+        machine
+            .as_ref()
+            .map_or(gcode::Dialect::Laser, gcode::Dialect::of),
+    );
     let options = SendOptions {
         s_max,
         made_for: machine.clone().map(|m| Box::new((m, reach))),
@@ -319,13 +276,9 @@ pub(super) fn prepare(args: &JobArgs, terminal: &Terminal) -> Result<Ready, Fail
         },
         ..SendOptions::default()
     };
-    let name = machine.as_ref().map(|m| m.name.as_str());
-    let port = port_of(args.port.as_deref(), name)?;
     Ok(Ready {
-        port,
-        named: args.port.is_some(),
+        port: args.at.port(machine.as_ref())?,
         reach,
-        baud: args.baud,
         text,
         rules,
         machine,
@@ -338,7 +291,7 @@ pub(super) fn prepare(args: &JobArgs, terminal: &Terminal) -> Result<Ready, Fail
 pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
     let what = &args.what;
     let ready = prepare(what, terminal)?;
-    if ready.port == SIM {
+    if ready.port.is_sim() {
         return rehearsal(&ready, what, global, terminal);
     }
     let cuts = match Cuts::of(&ready.job) {
@@ -367,9 +320,9 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
         let Some(cuts) = &cuts else {
             return send(port, &ready.job, &ready.options, &desk);
         };
-        let path = journal::path_for(&what.job);
+        let path = journal::path_for(&what.at.job);
         tell_of_old(&path, terminal);
-        let header = ready.header(&what.job, cuts);
+        let header = ready.header(&what.at.job, cuts);
         let mut journal = Journal::new(header, FileStore::new(&path));
         let sent = send_recorded(port, &ready.job, cuts, &ready.options, &desk, &mut journal);
         if let Err(error) = &sent
@@ -378,7 +331,7 @@ pub fn run(args: &SendArgs, global: &Global, terminal: &Terminal) -> Result<(), 
             terminal.note(&format!(
                 "what is cut stands in {}: `kagome resume {}` goes on from there",
                 path.display(),
-                what.job.display()
+                what.at.job.display()
             ));
         }
         sent
@@ -414,7 +367,7 @@ fn rehearsal(
         rehearse(&ready.text, &ready.settings(), &ready.rules, terminal).map_err(|error| {
             match error {
                 RehearsalError::Job(error) => {
-                    Failure::Bad(format!("{}: {error}", what.job.display()))
+                    Failure::Bad(format!("{}: {error}", what.at.job.display()))
                 }
                 RehearsalError::Send(error) => failure(*error),
             }

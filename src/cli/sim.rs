@@ -105,7 +105,11 @@ pub fn run(args: &SimArgs, global: &Global, terminal: &Terminal) -> Result<(), F
         )));
     }
     let mut settings = Settings::of_machine(&machine);
-    settings.homing = args.locked && machine.homing.enabled;
+    if !args.locked {
+        // Else it would be locked after every reset, also by the opening of the port.
+        settings.homing = false;
+        settings.soft_limits = false;
+    }
     let mut how = Serve {
         speed: args.speed.0,
         once: args.once,

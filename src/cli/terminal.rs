@@ -47,17 +47,6 @@ fn tell(text: &str) {
     let _ = std::io::stderr().write_all(text.as_bytes());
 }
 
-/// Asks the person at the terminal; anything but yes is no, also a terminal that was closed.
-pub(super) fn agrees(question: &str, terminal: &Terminal) -> bool {
-    let mut err = std::io::stderr();
-    let _ = write!(err, "{question}? [y/N] ").and_then(|()| err.flush());
-    let mut line = String::new();
-    let read = std::io::stdin().read_line(&mut line);
-    read.is_ok()
-        && !terminal.interrupted()
-        && matches!(line.trim().to_ascii_lowercase().as_str(), "y" | "yes")
-}
-
 impl Terminal {
     /// Takes over Ctrl-C, SIGTERM and SIGHUP (a closed terminal): the first asks the work to stop, the second ends the
     /// program at once, unless an [`ExitGuard`] lives.

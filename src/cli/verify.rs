@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::cut::drawing_of;
+use super::job_args::machine_for;
 use super::profiles::machine_named;
-use super::send::machine_for;
 use super::{Failure, Global, Terminal, print, print_json};
 use crate::base::units::short;
 use crate::{gcode, machine, pattern};

@@ -1,5 +1,9 @@
 //! A job, checked whole before anything is sent.
 
+use crate::gcode::Dialect;
+use crate::machine::{Machine, Tool};
+use crate::material::Process;
+
 /// What a job may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JobRules {
@@ -7,6 +11,8 @@ pub struct JobRules {
     pub line_limit: usize,
     /// M3 is allowed: the beam then stays on if the link fails.
     pub allow_constant_power: bool,
+    /// What M3 and M4 switch. A torch is on or off, also at rest and on rapids: the controller must not be in laser mode.
+    pub process: Process,
 }
 
 impl Default for JobRules {
@@ -14,6 +20,21 @@ impl Default for JobRules {
         Self {
             line_limit: 79,
             allow_constant_power: false,
+            process: Process::Laser,
+        }
+    }
+}
+
+impl JobRules {
+    /// What a machine's profile says. A torch has nothing but M3, so there the profile's word for it is enough; a laser's M3
+    /// is to be allowed for each job.
+    pub fn of(machine: &Machine) -> Self {
+        Self {
+            line_limit: machine.line_limit(),
+            allow_constant_power: machine
+                .plasma()
+                .is_some_and(|torch| torch.accept_arc_on_after_lost_link),
+            process: machine.tool().map_or(Process::Laser, Tool::process),
         }
     }
 }
@@ -114,6 +135,14 @@ pub enum JobError {
         /// Line number, from 1.
         line: usize,
     },
+    /// A torch without permission.
+    #[error(
+        "line {line} switches the torch on (M3): if the cable is pulled in mid-cut it stays on, and no computer can switch it off. If you will stay beside the table, write accept_arc_on_after_lost_link = true in its profile. Nothing was sent"
+    )]
+    Arc {
+        /// Line number, from 1.
+        line: usize,
+    },
     /// The last word on the beam is "on".
     #[error(
         "line {line} switches the beam on and nothing after it switches it off: end the job with M5. Nothing was sent"
@@ -137,6 +166,7 @@ pub struct Job {
     /// End of each line in `text`, and its number in the file.
     lines: Vec<(usize, usize)>,
     constant_power: bool,
+    process: Process,
     largest_s: f64,
     longest_dwell_s: f64,
     line_limit: usize,
@@ -152,6 +182,7 @@ impl Job {
             text: String::with_capacity(text.len()),
             lines: Vec::new(),
             constant_power: false,
+            process: rules.process,
             largest_s: 0.0,
             longest_dwell_s: 0.0,
             line_limit: rules.line_limit,
@@ -188,10 +219,14 @@ impl Job {
                     limit: rules.line_limit,
                 });
             }
-            let found = read_words(kept, line)?;
-            if found.m3 {
+            let found = read_words(kept, line, rules.process)?;
+            // Without laser mode M4 is as constant as M3: a spindle that turns the other way.
+            if found.m3 || (found.on && job.is_torch()) {
                 if !rules.allow_constant_power {
-                    return Err(JobError::ConstantPower { line });
+                    return Err(match rules.process {
+                        Process::Laser => JobError::ConstantPower { line },
+                        Process::Plasma => JobError::Arc { line },
+                    });
                 }
                 job.constant_power = true;
             }
@@ -282,6 +317,24 @@ impl Job {
         self.constant_power
     }
 
+    /// True if it drives a torch, on a controller without laser mode.
+    pub fn is_torch(&self) -> bool {
+        self.process == Process::Plasma
+    }
+
+    /// Whose rules it is read by.
+    pub(super) fn dialect(&self) -> Dialect {
+        match self.process {
+            Process::Laser => Dialect::Laser,
+            Process::Plasma => Dialect::Table,
+        }
+    }
+
+    /// True if it feels for the sheet (G38), so that it does not matter how high the torch hung before.
+    pub(super) fn probes(&self) -> bool {
+        self.lines().any(|(text, _)| text.contains("G38."))
+    }
+
     /// The largest S word.
     pub fn largest_s(&self) -> f64 {
         self.largest_s
@@ -338,7 +391,7 @@ struct Found {
     dwell_s: f64,
 }
 
-fn read_words(text: &str, line: usize) -> Result<Found, JobError> {
+fn read_words(text: &str, line: usize, process: Process) -> Result<Found, JobError> {
     let mut found = Found::default();
     let mut dwell = false;
     let mut p = 0.0;
@@ -383,6 +436,8 @@ fn read_words(text: &str, line: usize) -> Result<Found, JobError> {
                     "this writes the controller's memory, and while it writes it loses what is sent: set the origin before the job, not in it",
                 ));
             }
+            // With its height control, a torch feels for the sheet before each cut.
+            'G' if process == Process::Plasma && [38.2, 38.3, 38.4, 38.5].contains(&value) => {}
             'G' if value.trunc() == 38.0 => {
                 return Err(wrong(
                     word,

@@ -21,6 +21,7 @@ mod console;
 mod follow;
 mod job;
 pub mod journal;
+mod offsets;
 mod operator;
 mod port;
 mod reply;
@@ -39,6 +40,7 @@ pub use console::{
 };
 pub use follow::{Cut, Cuts, Follower, NotFollowed, Sighting};
 pub use job::{Job, JobError, JobRules};
+pub use offsets::Offsets;
 pub use operator::{Change, Glance, Operator, Unattended, Wish};
 pub use port::{OpenPort, usb_name};
 pub use reply::{MachineState, Reply, Status};

@@ -30,6 +30,8 @@ pub struct Status {
     pub state: MachineState,
     /// The position it tells, mm: machine coordinates, or work coordinates where the controller is set so.
     pub position_mm: Option<[f64; 3]>,
+    /// Half of the last decimal of that position, mm: what is lost by rounding it, in each axis.
+    pub rounding_mm: f64,
     /// The position is in work coordinates.
     pub is_work: bool,
     /// The work offset, if this report tells it, mm: machine coordinates of the job's zero point.
@@ -49,7 +51,12 @@ pub struct Status {
 impl Status {
     /// True if this report proves that the machine stands and its beam is off.
     pub fn dark_and_still(&self) -> bool {
-        let still = matches!(
+        self.is_still() && self.s == Some(0.0)
+    }
+
+    /// True if this report proves that the machine stands.
+    pub fn is_still(&self) -> bool {
+        matches!(
             self.state,
             MachineState::Idle
                 | MachineState::Hold(true)
@@ -57,8 +64,7 @@ impl Status {
                 | MachineState::Alarm
                 | MachineState::Sleep
                 | MachineState::Check
-        );
-        still && self.s == Some(0.0)
+        )
     }
 
     /// The same from a controller that reports in inches (`$13=1`), or in units of so many mm.
@@ -67,6 +73,7 @@ impl Status {
         scale(&mut self.position_mm);
         scale(&mut self.offset_mm);
         self.rate_mm_min = self.rate_mm_min.map(|r| r * unit_mm);
+        self.rounding_mm *= unit_mm;
         self
     }
 
@@ -91,6 +98,7 @@ impl Status {
         let mut status = Self {
             state,
             position_mm: None,
+            rounding_mm: 0.0,
             is_work: false,
             offset_mm: None,
             rate_mm_min: None,
@@ -103,6 +111,7 @@ impl Status {
             match name {
                 "MPos" | "WPos" => {
                     status.position_mm = Some(triple(values)?);
+                    status.rounding_mm = rounding(values);
                     status.is_work = name == "WPos";
                 }
                 "WCO" => status.offset_mm = Some(triple(values)?),
@@ -131,13 +140,22 @@ impl Status {
 }
 
 /// The first three of a list of numbers; machines with more axes tell more.
-pub(super) fn triple(text: &str) -> Option<[f64; 3]> {
+fn triple(text: &str) -> Option<[f64; 3]> {
     let mut list = text.split(',').map(str::parse::<f64>);
     let mut place = [0.0; 3];
     for p in &mut place {
         *p = list.next()?.ok().filter(|v| v.is_finite())?;
     }
     Some(place)
+}
+
+/// Half of the last decimal of the coarsest of the first two numbers.
+fn rounding(text: &str) -> f64 {
+    let decimals = text.split(',').take(2).map(|number| {
+        let after = number.split_once('.').map_or("", |(_, after)| after);
+        i32::try_from(after.len()).unwrap_or(9).min(9)
+    });
+    0.5 * 0.1f64.powi(decimals.min().unwrap_or(0))
 }
 
 /// One line from the controller.
@@ -238,6 +256,23 @@ mod tests {
             Reply::parse("[MSG:Pgm End]"),
             Some(Reply::Message(_))
         ));
+    }
+
+    #[test]
+    fn what_rounding_may_hide_is_half_of_the_last_decimal() {
+        for (place, unit_mm, rounding_mm) in [
+            ("1.000,2.125,0.0", 1.0, 0.0005),
+            ("1.0000,2.1250,0", 25.4, 0.00127),
+            ("12,3.5,0.000", 1.0, 0.5),
+            ("0.5,3.55,0.000", 1.0, 0.05),
+        ] {
+            let Some(Reply::Status(status)) = Reply::parse(&format!("<Idle|MPos:{place}|FS:0,0>"))
+            else {
+                panic!("a report");
+            };
+            let found = status.scaled(unit_mm).rounding_mm;
+            assert!((found - rounding_mm).abs() < 1e-9, "{place}: {found}");
+        }
     }
 
     #[test]

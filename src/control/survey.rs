@@ -3,8 +3,9 @@
 //! A profile is what the job was made for: its times, its bed. What the controller would do otherwise is told before
 //! anything is sent; what would burn in the wrong place is refused.
 
+use super::reply::Reply;
 use crate::base::units::short;
-use crate::gcode::read;
+use crate::gcode::{Dialect, read_as};
 use crate::machine::Machine;
 
 /// Lengths of controllers and profiles are the same within so much, mm.
@@ -27,9 +28,9 @@ pub struct JobReach {
 }
 
 impl JobReach {
-    /// Of a job's text; none if it moves nowhere.
-    pub fn of(text: &str) -> Option<Self> {
-        let program = read(text);
+    /// Of a job's text, read by these rules; none if it moves nowhere.
+    pub fn of(text: &str, dialect: Dialect) -> Option<Self> {
+        let program = read_as(text, dialect);
         let mut all: Option<[[f64; 2]; 2]> = None;
         let mut burnt: Option<[[f64; 2]; 2]> = None;
         let mut feed_mm_per_min: f64 = 0.0;
@@ -150,22 +151,87 @@ impl Survey {
             return;
         }
         let mask = found(23).unwrap_or(0.0) as u32;
-        for (axis, number) in [(0, 130), (1, 131)] {
-            let Some(travel) = found(number).filter(|t| *t > 0.0) else {
-                continue;
-            };
-            let from_zero = options.contains('Z') || found(22).unwrap_or(0.0) as u32 & 8 != 0;
-            let upwards = from_zero && mask & (1 << axis) != 0;
-            let [low, high] = if upwards {
+        let from_zero = options.contains('Z') || found(22).unwrap_or(0.0) as u32 & 8 != 0;
+        let range = |axis: usize, number: u32| {
+            let travel = found(number).filter(|t| *t > 0.0)?;
+            Some(if from_zero && mask & (1 << axis) != 0 {
                 [0.0, travel]
             } else {
                 [-travel, 0.0]
+            })
+        };
+        self.within(
+            [range(0, 130), range(1, 131)],
+            "$130, $131",
+            reach,
+            offset_mm,
+        );
+    }
+
+    /// What FluidNC is asked, line by line, before [`Survey::travel_of_file`]: where its axes home to and how far they go stands
+    /// in its configuration file. A key that it refuses is one that this version does not know.
+    pub const TRAVEL_OF_FILE: [&'static str; 8] = [
+        "$/axes/x/homing/cycle",
+        "$/axes/x/homing/positive_direction",
+        "$/axes/x/homing/mpos_mm",
+        "$/axes/x/max_travel_mm",
+        "$/axes/y/homing/cycle",
+        "$/axes/y/homing/positive_direction",
+        "$/axes/y/homing/mpos_mm",
+        "$/axes/y/max_travel_mm",
+    ];
+
+    /// [`Survey::travel`] of FluidNC, from its replies to [`Survey::TRAVEL_OF_FILE`]: an axis is at `mpos_mm` at its switch, and
+    /// its travel lies below that where it homes in the positive direction, else above (`limitsMinPosition` and
+    /// `limitsMaxPosition` of FluidNC's `Limit.cpp`). An axis that does not home (cycle 0 or less), or does not tell all of
+    /// this, is not judged.
+    pub fn travel_of_file(&mut self, replies: &[Reply], reach: &JobReach, offset_mm: [f64; 3]) {
+        let told = |axis: &str, key: &str| {
+            replies.iter().find_map(|reply| {
+                let Reply::Unknown(text) = reply else {
+                    return None;
+                };
+                let rest = text.strip_prefix("$/axes/")?.strip_prefix(axis)?;
+                let (name, value) = rest.strip_prefix('/')?.split_once('=')?;
+                (name == key).then(|| value.trim())
+            })
+        };
+        let range = |axis: &str| {
+            let number = |key: &str| {
+                let value: f64 = told(axis, key)?.parse().ok()?;
+                value.is_finite().then_some(value)
+            };
+            let homes = number("homing/cycle")? >= 1.0;
+            let travel = number("max_travel_mm").filter(|t| homes && *t > 0.0)?;
+            let at_switch = number("homing/mpos_mm")?;
+            match told(axis, "homing/positive_direction")? {
+                "true" => Some([at_switch - travel, at_switch]),
+                "false" => Some([at_switch, at_switch + travel]),
+                _ => None,
+            }
+        };
+        let place = "max_travel_mm and mpos_mm in its configuration";
+        self.within([range("x"), range("y")], place, reach, offset_mm);
+    }
+
+    /// Refuses a job that leaves the range of an axis (machine coordinates, mm; none where it is not known). `place`: where the
+    /// controller has these ranges.
+    fn within(
+        &mut self,
+        ranges: [Option<[f64; 2]>; 2],
+        place: &str,
+        reach: &JobReach,
+        offset_mm: [f64; 3],
+    ) {
+        for (axis, range) in ranges.into_iter().enumerate() {
+            let Some([low, high]) = range else {
+                continue;
             };
             let ends = [reach.min_mm[axis], reach.max_mm[axis]].map(|v| v + offset_mm[axis]);
             let name = ["X", "Y"][axis];
             if ends[0] < low - SAME_MM || ends[1] > high + SAME_MM {
                 self.refused.push(format!(
-                    "the job would go from {name}{} to {name}{} in machine coordinates, and the machine has {} to {}: set the work zero where the sheet lies (kagome zero), or check the travel (${number})",
+                    "the job would go from {name}{} to {name}{} in machine coordinates, and the machine has {} to {}: set the work zero where the sheet lies (kagome zero), or check the travel ({place})",
                     short(ends[0], 2),
                     short(ends[1], 2),
                     short(low, 2),
@@ -211,11 +277,11 @@ mod tests {
     #[test]
     fn a_job_outside_of_the_travel_is_refused() {
         let job = "G21 G90\nG0 X10 Y20\nM4 S500\nG1 X110 Y20 F1200\nG1 X110 Y60\nM5\nG0 X0 Y0\n";
-        let reach = JobReach::of(job).unwrap();
+        let reach = JobReach::of(job, Dialect::Laser).unwrap();
         assert_eq!((reach.min_mm, reach.max_mm), ([0.0; 2], [110.0, 60.0]));
         assert_eq!(reach.burnt_mm, Some([[10.0, 20.0], [110.0, 60.0]]));
         assert_eq!(reach.feed_mm_per_min, 1200.0);
-        assert_eq!(JobReach::of("G21\nM5\n"), None);
+        assert_eq!(JobReach::of("G21\nM5\n", Dialect::Laser), None);
         let refused = |options: &str, offset: [f64; 3]| {
             let homes = if options == "hal" { 9 } else { 1 };
             let found = controller(&format!("$22={homes}\n$23=3\n$130=600\n$131=400\n"));
@@ -236,5 +302,65 @@ mod tests {
         let mut survey = Survey::default();
         survey.travel(&controller("$22=0\n$130=1\n"), "V", &reach, [0.0; 3]);
         assert_eq!(survey, Survey::default());
+    }
+
+    #[test]
+    fn fluidnc_has_each_axis_where_its_file_says() {
+        let job = "G21 G90\nG0 X10 Y20\nM4 S500\nG1 X110 Y60 F1200\nM5\n";
+        let reach = JobReach::of(job, Dialect::Laser).unwrap();
+        let file = |axis: &str, cycle: &str, positive: &str, mpos: &str, travel: &str| {
+            let key = |key: &str, value: &str| format!("$/axes/{axis}/{key}={value}");
+            [
+                key("homing/cycle", cycle),
+                key("homing/positive_direction", positive),
+                key("homing/mpos_mm", mpos),
+                key("max_travel_mm", travel),
+            ]
+        };
+        let refused = |lines: &[String], offset: [f64; 3]| {
+            let replies: Vec<Reply> = lines.iter().filter_map(|l| Reply::parse(l)).collect();
+            let mut survey = Survey::default();
+            survey.travel_of_file(&replies, &reach, offset);
+            assert!(survey.warned.is_empty());
+            survey.refused
+        };
+        // X homes towards its lower end and calls it 0, Y towards its upper one and calls that 300.
+        let both = |x: [String; 4], y: [String; 4]| [x, y].concat();
+        let lines = both(
+            file("x", "2", "false", "0.000", "400.000"),
+            file("y", "2", "true", "300.000", "300.000"),
+        );
+        assert_eq!(refused(&lines, [0.0; 3]), Vec::<String>::new());
+        assert_eq!(refused(&lines, [290.0, 240.0, 0.0]), Vec::<String>::new());
+        let told = refused(&lines, [291.0, 241.0, 0.0]);
+        assert_eq!(told.len(), 2);
+        assert!(told[0].contains("from X301 to X401") && told[0].contains("0 to 400"));
+        assert!(told[1].contains("max_travel_mm"), "{told:?}");
+        assert_eq!(refused(&lines, [-11.0, -21.0, 0.0]).len(), 2);
+        // As GRBL has it: −travel to 0.
+        let lines = both(
+            file("x", "1", "true", "0.000", "400.000"),
+            file("y", "1", "true", "0.000", "300.000"),
+        );
+        assert_eq!(refused(&lines, [-400.0, -300.0, 0.0]), Vec::<String>::new());
+        assert_eq!(refused(&lines, [0.0; 3]).len(), 2);
+        // What is not told, or not homed, is not judged.
+        let x = file("x", "1", "true", "0.000", "400.000");
+        for k in 0..4 {
+            let mut some = x.to_vec();
+            some.remove(k);
+            assert_eq!(refused(&some, [0.0; 3]), Vec::<String>::new(), "{k}");
+        }
+        assert_eq!(refused(&x, [0.0; 3]).len(), 1);
+        for unhomed in ["0", "-1"] {
+            let x = file("x", unhomed, "true", "0.000", "400.000");
+            assert_eq!(refused(&x, [0.0; 3]), Vec::<String>::new());
+        }
+        // The questions are for what is read.
+        for line in file("x", "1", "true", "0", "1") {
+            let key = line.split_once('=').unwrap().0;
+            assert!(Survey::TRAVEL_OF_FILE.contains(&key), "{key}");
+            assert!(Survey::TRAVEL_OF_FILE.contains(&&*key.replace("/x/", "/y/")));
+        }
     }
 }

@@ -213,14 +213,19 @@ fn findings(text: &str, machine: &Machine, sheet: &Sheet, passes: u32) -> Vec<Fi
         .findings
 }
 
-const TORCHES: [&str; 3] = ["plasma-generic", "plasma-linuxcnc", "plasma-qtplasmac"];
+const TORCHES: [&str; 4] = [
+    "plasma-generic",
+    "plasma-grbl",
+    "plasma-linuxcnc",
+    "plasma-qtplasmac",
+];
 
 proptest! {
     #![proptest_config(crate::base::cases::cases(48))]
 
     #[test]
-    fn every_torch_cuts_the_sheet(removed in removed(), torch in 0usize..3, marked: bool) {
-        let (sheet, text, machine) = torch_job(TORCHES[torch], &removed, torch == 2 && marked);
+    fn every_torch_cuts_the_sheet(removed in removed(), torch in 0usize..4, marked: bool) {
+        let (sheet, text, machine) = torch_job(TORCHES[torch], &removed, torch == 3 && marked);
         let verdict = verify(&text, &machine, Some(&sheet), None).unwrap();
         prop_assert_eq!(&verdict.findings, &[], "{}", text);
         prop_assert_eq!(verdict.ligaments.unwrap().pieces, Some(1));
@@ -231,7 +236,7 @@ proptest! {
 
     #[test]
     fn small_holes_are_cut_slowly_and_left_with_the_torch_off_where_qtplasmac_does_it(
-        removed in removed(), torch in 0usize..3, hole_mm in 5.0..20.0f64, below_mm in 5.0..20.0f64,
+        removed in removed(), torch in 0usize..4, hole_mm in 5.0..20.0f64, below_mm in 5.0..20.0f64,
     ) {
         let mut machine = machine::load(TORCHES[torch]).unwrap();
         if let Some(small) = machine.plasma.as_mut().unwrap().small_hole.as_mut() {
@@ -241,7 +246,7 @@ proptest! {
         let verdict = verify(&text, &machine, Some(&sheet), None).unwrap();
         prop_assert_eq!(&verdict.findings, &[], "{}", text);
         let holes = if sheet.triangles.len() > 1 { 2 } else { 1 };
-        let small = if torch == 2 && hole_mm <= below_mm { holes } else { 0 };
+        let small = if torch == 3 && hole_mm <= below_mm { holes } else { 0 };
         prop_assert_eq!(text.matches("M62 P3\n").count(), small);
         if small == 0 {
             return Ok(());

@@ -104,12 +104,12 @@ pub(crate) fn prove(
     );
     progress.check()?;
 
-    let (machine_s, rehearsal) = if machine.controller.is_streamed() && machine.laser().is_some() {
+    let (machine_s, rehearsal) = if machine.controller.is_streamed() {
         let (time_s, summary) =
             rehearsed(&gcode, sheet, machine, setting, &mut objections, progress)?;
         (time_s, Some(summary))
     } else {
-        // The simulated machine is a laser to which a job is streamed.
+        // The simulated machine is one to which a job is streamed.
         (estimated_s(&gcode, machine, setting), None)
     };
     let figures = toolpath.figures();
@@ -124,6 +124,9 @@ pub(crate) fn prove(
     })
 }
 
+/// A torch stands longer than its pierce delay by the way down to the cutting height and the stops of the firmware, s.
+const PIERCE_SLACK_S: f64 = 1.0;
+
 /// Runs the job on the simulated machine, and compares what that has burnt with the sheet: its time, s, and its figures.
 fn rehearsed(
     gcode: &str,
@@ -134,12 +137,10 @@ fn rehearsed(
     progress: &dyn Progress,
 ) -> Result<(f64, RehearsalSummary), MakeError> {
     progress.start("rehearsing on the simulated machine", None);
-    let rules = JobRules {
-        allow_constant_power: machine
-            .laser()
-            .is_some_and(|l| l.power_mode == PowerMode::Constant),
-        line_limit: machine.line_limit(),
-    };
+    let mut rules = JobRules::of(machine);
+    rules.allow_constant_power |= machine
+        .laser()
+        .is_some_and(|l| l.power_mode == PowerMode::Constant);
     let rehearsal = rehearse(
         gcode.as_bytes(),
         &Settings::of_machine(machine),
@@ -166,13 +167,23 @@ fn rehearsed(
         differences.iter().map(ToString::to_string),
     ));
     let s = &rehearsal.summary;
+    let longest_stand_s = rehearsal
+        .burns
+        .iter()
+        .filter(|b| b.standing())
+        .map(|b| b.end_s - b.start_s)
+        .fold(0.0, f64::max);
     for (wrong, what) in [
         (s.rapid_burn_mm > 0.0, "the beam was on during rapid moves"),
         (s.beam_on_at_end, "the beam was on at the end"),
         (s.lost_bytes > 0, "the controller's buffer overflowed"),
         (
-            s.standing_burn_s > 0.0,
+            s.standing_burn_s > 0.0 && machine.laser().is_some(),
             "the beam was on while the head stood still",
+        ),
+        (
+            longest_stand_s > setting.torch.map_or(0.0, |t| t.pierce_delay_s) + PIERCE_SLACK_S,
+            "the torch stood on one spot for longer than a pierce takes",
         ),
     ] {
         if wrong {
@@ -182,7 +193,7 @@ fn rehearsed(
     Ok((rehearsal.time_s, rehearsal.summary))
 }
 
-/// How long a torch takes, s: the planner's time for its motion, a stop and the pierce delay for every cut. What height
+/// How long a torch to which nothing is streamed takes, s: the planner's time for its motion, a stop and the pierce delay for every cut. What height
 /// control takes for its probing is not in it.
 fn estimated_s(gcode: &str, machine: &Machine, setting: &CutSetting) -> f64 {
     let program = gcode::read_with(

@@ -26,12 +26,14 @@ pub enum Where {
 }
 
 /// What a line does to the tool.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Effect {
     /// M3.
     pub tool_on: bool,
     /// M5.
     pub tool_off: bool,
+    /// The S word, if its number is written out.
+    pub s: Option<f64>,
 }
 
 /// Whether coordinates are places or steps.
@@ -219,7 +221,11 @@ fn judge(
                 "has {name}: only a cut's template moves the torch up and down"
             ));
         }
-        'Z' | 'F' | 'P' | 'Q' | 'S' | 'K' | 'N' | 'E' | 'L' | 'H' | 'R' | 'T' => return Ok(()),
+        'S' => {
+            effect.s = word.value;
+            return Ok(());
+        }
+        'Z' | 'F' | 'P' | 'Q' | 'K' | 'N' | 'E' | 'L' | 'H' | 'R' | 'T' => return Ok(()),
         '$' => {
             return if controller == Controller::LinuxCnc {
                 Ok(())
@@ -247,7 +253,9 @@ fn judge(
                     "has {name}: a line of the profile must not move the head"
                 ));
             }
-            0 | 10 | 310 | 382 | 383 | 910 | 920 => in_cut,
+            // GRBL and its successors know no G31.
+            310 => in_cut && files,
+            0 | 10 | 382 | 383 | 910 | 920 => in_cut,
             640 => files,
             // Forgets what a template's G92 Z has set.
             921 => in_cut || matches!(place, Where::Postamble { .. }),

@@ -30,6 +30,10 @@ const SHIPPED: &[(&str, &str)] = &[
         include_str!("../../machines/plasma-generic.toml"),
     ),
     (
+        "plasma-grbl",
+        include_str!("../../machines/plasma-grbl.toml"),
+    ),
+    (
         "plasma-linuxcnc",
         include_str!("../../machines/plasma-linuxcnc.toml"),
     ),
@@ -359,6 +363,24 @@ mod tests {
                 "\"G92 Z0\"",
                 "\"G91\"",
                 "plasma.template.begin_cut",
+            ),
+            (
+                "plasma-grbl",
+                "accept_arc_on_after_lost_link = true",
+                "",
+                "plasma.accept_arc_on_after_lost_link",
+            ),
+            (
+                "plasma-grbl",
+                "M3 S1000",
+                "M3",
+                "plasma.template.begin_cut[3]",
+            ),
+            (
+                "plasma-grbl",
+                "G38.2",
+                "G31",
+                "plasma.template.begin_cut[0]",
             ),
             (
                 "plasma-generic",

@@ -109,6 +109,9 @@ pub struct PlasmaTool {
     /// Height of the torch between cuts, millimetres over the sheet; needed with a template.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub safe_height_mm: Option<f64>,
+    /// A table to which the job is streamed needs this to be true: if the link is lost in mid-cut the torch stays on.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub accept_arc_on_after_lost_link: bool,
     /// Whether a scribe makes marks (QtPlasmaC's tool `$1`).
     #[serde(default)]
     pub scribe: bool,
@@ -258,6 +261,14 @@ impl PlasmaTool {
                 "is needed with a template: the height of the torch between cuts",
             ));
         }
+        if controller.is_streamed() && !self.accept_arc_on_after_lost_link {
+            return Err(Complaint::new(
+                "plasma.accept_arc_on_after_lost_link",
+                format!(
+                    "is not there: a job is streamed to {controller}, and if the cable is pulled in mid-cut the torch stays on, and no program can switch it off. Let the job be read from a file at the table, or write accept_arc_on_after_lost_link = true, and stay beside it"
+                ),
+            ));
+        }
         template.check(controller, limit)
     }
 }
@@ -265,12 +276,21 @@ impl PlasmaTool {
 impl Template {
     fn check(&self, controller: Controller, limit: usize) -> Result<(), Complaint> {
         let mut on = 0;
+        // What stays in force from line to line, and from the end of one cut to the next.
+        let mut s = 0.0;
         for (i, line) in self.begin_cut.iter().enumerate() {
             let key = format!("plasma.template.begin_cut[{i}]");
-            on += usize::from(
-                self.check_line(&key, line, controller, limit, Where::BeginCut)?
-                    .tool_on,
-            );
+            let effect = self.check_line(&key, line, controller, limit, Where::BeginCut)?;
+            s = effect.s.unwrap_or(s);
+            on += usize::from(effect.tool_on);
+            if effect.tool_on && controller.is_streamed() && s <= 0.0 {
+                return Err(Complaint::new(
+                    key,
+                    format!(
+                        "switches the torch on without power: {controller} switches its output only for an S above 0. Write M3 S1000, or what $30 is on the table"
+                    ),
+                ));
+            }
         }
         if on != 1 {
             return Err(Complaint::new(

@@ -494,6 +494,7 @@ mod tests {
                 "diode-400-fluidnc",
                 "fibre-300",
                 "plasma-generic",
+                "plasma-grbl",
                 "plasma-linuxcnc",
                 "plasma-qtplasmac",
             ]
@@ -514,17 +515,17 @@ mod tests {
             })
             .collect();
         let expected = [
-            ("acrylic-3", "++LLLPPP"),
-            ("brass-0.2", "LLLL+PPP"),
-            ("brass-1.5", "PPPPP+++"),
-            ("cardboard-1.5", "++++LPPP"),
-            ("copper-0.2", "LLLL+PPP"),
-            ("copper-1.5", "PPPPP+++"),
-            ("felt-3", "++++LPPP"),
-            ("leather-1.6", "++++LPPP"),
-            ("plywood-3", "++++LPPP"),
-            ("steel-0.2", "LLLL+PPP"),
-            ("steel-1.5", "PPPPP+++"),
+            ("acrylic-3", "++LLLPPPP"),
+            ("brass-0.2", "LLLL+PPPP"),
+            ("brass-1.5", "PPPPP++++"),
+            ("cardboard-1.5", "++++LPPPP"),
+            ("copper-0.2", "LLLL+PPPP"),
+            ("copper-1.5", "PPPPP++++"),
+            ("felt-3", "++++LPPPP"),
+            ("leather-1.6", "++++LPPPP"),
+            ("plywood-3", "++++LPPPP"),
+            ("steel-0.2", "LLLL+PPPP"),
+            ("steel-1.5", "PPPPP++++"),
         ]
         .map(|(a, b)| (a.to_owned(), b.to_owned()));
         assert_eq!(rows, expected);

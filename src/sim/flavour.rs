@@ -4,6 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::settings::Settings;
 use crate::machine::Controller as Kind;
 use crate::planner::StepTimer;
 
@@ -144,12 +145,14 @@ impl Flavour {
         }
     }
 
-    /// The answer to `$I`, for a controller with these buffers and this text of its owner.
-    pub(crate) fn build_info(self, blocks: usize, buffer: usize, owner: &str) -> Vec<String> {
+    /// The answer to `$I`, for a controller with these settings and this text of its owner.
+    pub(crate) fn build_info(self, settings: &Settings, owner: &str) -> Vec<String> {
+        let (blocks, buffer) = (settings.planner_blocks, settings.receive_buffer);
+        let zero = if settings.homing_sets_zero { "Z" } else { "" };
         match self {
             Self::Grbl => vec![
                 format!("[VER:1.1h.20190830:{owner}]"),
-                format!("[OPT:V,{blocks},{buffer}]"),
+                format!("[OPT:V{zero},{blocks},{buffer}]"),
             ],
             Self::GrblHal => vec![
                 format!("[VER:1.1f.20240101:{owner}]"),

@@ -89,7 +89,7 @@ pub enum RehearsalError {
     Send(#[from] Box<SendError>),
 }
 
-/// Runs a job on a simulated machine with these settings, which stands at its origin, as fast as possible.
+/// Runs a job on a simulated machine with these settings, homed, which stands at its origin, as fast as possible.
 ///
 /// # Errors
 /// What the sender would say at a real machine.
@@ -100,7 +100,7 @@ pub fn rehearse(
     progress: &dyn Progress,
 ) -> Result<Rehearsal, RehearsalError> {
     let job = Job::check(job_text, rules)?;
-    let mut link = SimTransport::new(Controller::new(settings.clone()));
+    let mut link = SimTransport::new(Controller::homed_at_zero(settings.clone()));
     let options = SendOptions {
         longest_pause: Some(Duration::from_secs(60)),
         buffer: Some(settings.receive_buffer),

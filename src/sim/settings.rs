@@ -32,6 +32,10 @@ pub struct Settings {
     pub homing: bool,
     /// `$23`: bit k set: axis k homes towards its negative end.
     pub homing_direction_mask: f64,
+    /// Where homing has put the head is machine zero, and an axis that homes towards its negative end goes from 0 to its
+    /// travel. GRBL is built so (`Z` of `$I`), grblHAL has bit 3 of `$22` for it, FluidNC `mpos_mm: 0` in its file. Else
+    /// every axis goes from −travel to 0.
+    pub homing_sets_zero: bool,
     /// `$24`: homing rate of the second, slow search, mm/min.
     pub homing_feed_mm_min: f64,
     /// `$25`: homing rate of the first search and off the switch, mm/min.
@@ -84,6 +88,7 @@ impl Default for Settings {
             hard_limits: false,
             homing: false,
             homing_direction_mask: 0.0,
+            homing_sets_zero: false,
             homing_feed_mm_min: 25.0,
             homing_seek_mm_min: 500.0,
             homing_debounce_ms: 250.0,
@@ -119,6 +124,9 @@ pub enum Switch {
 
 /// One `$` setting: its number, value and how many decimals GRBL prints.
 pub(crate) type Row = (u16, f64, usize);
+
+/// How far below the highest place of a raised torch the sheet of the machine that is built in lies, mm.
+const SHEET_BELOW_MM: f64 = 10.0;
 
 impl Settings {
     /// A laser in laser mode with these limits, bed and full-power S word; everything else as shipped.
@@ -163,10 +171,22 @@ impl Settings {
             },
         };
         settings = settings.with_flavour(Flavour::of(machine.controller));
+        // A sheet to be felt for, so far below the torch's highest place that it can rise over it.
+        settings.surface_mm = machine
+            .plasma()
+            .map(|torch| -(torch.safe_height_mm.unwrap_or(0.0) + SHEET_BELOW_MM));
         if let Some(connection) = &machine.connection {
             settings.receive_buffer = connection.receive_buffer_bytes as usize;
             settings.planner_blocks = connection.planner_blocks as usize;
             settings.baud = Some(f64::from(connection.baud));
+        }
+        if machine.homing.enabled {
+            // To the corner that is zero in the profile, so that a homed machine counts as its jobs do.
+            let [x, y] = machine.reach().min.map(|low| u8::from(low == 0.0));
+            settings.homing = true;
+            settings.soft_limits = true;
+            settings.homing_sets_zero = true;
+            settings.homing_direction_mask = f64::from(x + 2 * y);
         }
         settings
     }
@@ -197,6 +217,44 @@ impl Settings {
         }
     }
 
+    /// `$22`.
+    fn homing_flags(&self) -> f64 {
+        let sets_zero = self.homing_sets_zero && self.flavour == Flavour::GrblHal;
+        f64::from(u8::from(self.homing) + 8 * u8::from(self.homing && sets_zero))
+    }
+
+    /// Where the switch of an axis lies on the bed, mm: at the end of its way, or, where homing makes zero of the place
+    /// beside it, as far beyond that end as homing gets off it.
+    pub(crate) fn switch_mm(&self, axis: usize) -> f64 {
+        let [low, high] = self.range_mm(axis);
+        let beyond = if self.homing_sets_zero {
+            self.homing_pull_off_mm
+        } else {
+            0.0
+        };
+        if self.homes_downwards(axis) {
+            low - beyond
+        } else {
+            high + beyond
+        }
+    }
+
+    /// The ends of an axis in machine coordinates, mm, once it is homed.
+    pub(crate) fn range_mm(&self, axis: usize) -> [f64; 2] {
+        let travel = self.travel_mm[axis];
+        if self.homing_sets_zero && self.homes_downwards(axis) {
+            [0.0, travel]
+        } else {
+            [-travel, 0.0]
+        }
+    }
+
+    /// An axis homes towards its negative end.
+    pub(crate) fn homes_downwards(&self, axis: usize) -> bool {
+        // A mask of 3 bits: the cast keeps it.
+        self.homing_direction_mask as u8 & (1 << axis) != 0
+    }
+
     /// The settings as `$$` lists them.
     pub(crate) fn rows(&self) -> Vec<Row> {
         let flag = |b: bool| f64::from(u8::from(b));
@@ -209,7 +267,7 @@ impl Settings {
             (13, flag(self.report_inches), 0),
             (20, flag(self.soft_limits), 0),
             (21, flag(self.hard_limits), 0),
-            (22, flag(self.homing), 0),
+            (22, self.homing_flags(), 0),
             (23, self.homing_direction_mask, 0),
             (24, self.homing_feed_mm_min, 3),
             (25, self.homing_seek_mm_min, 3),
@@ -287,6 +345,9 @@ impl Settings {
             22 => {
                 self.homing = on;
                 self.soft_limits &= on;
+                if self.flavour == Flavour::GrblHal {
+                    self.homing_sets_zero = value as u32 & 8 != 0;
+                }
             }
             23 => self.homing_direction_mask = value.trunc(),
             25 => self.homing_seek_mm_min = value.max(1.0),

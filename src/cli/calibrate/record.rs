@@ -10,6 +10,7 @@ use super::today;
 use crate::base::atomic::write_file;
 use crate::base::progress::Progress as _;
 use crate::calibrate::{Coupon, Readings};
+use crate::cli::question::TypedLines;
 use crate::cli::{Failure, Global, Terminal, print_json};
 
 /// Arguments of `kagome calibrate record`.
@@ -70,7 +71,7 @@ pub(super) fn run(args: &RecordArgs, global: &Global, terminal: &Terminal) -> Re
             ask(
                 &coupon,
                 &date,
-                &mut std::io::stdin().lock(),
+                &mut TypedLines::new(terminal),
                 &mut std::io::stderr().lock(),
             )?
         }

@@ -1,14 +1,13 @@
 //! `kagome frame`: the head goes around the job before it is cut.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 use crate::base::units::{fixed, short};
-use crate::cli::port_args::{self, port_of, remember};
-use crate::cli::send::{failure, machine_for};
+use crate::cli::job_args::JobAt;
+use crate::cli::send::failure;
 use crate::cli::{Failure, Global, Terminal, print, print_json};
 use crate::control::{Job, JobReach, JobRules, SendOptions, Unattended, send};
+use crate::gcode::Dialect;
 
 /// What lights a mark and burns none, per cent of full power, at the most.
 const MOST_PERCENT: f64 = 5.0;
@@ -19,17 +18,8 @@ const MOST_PERCENT: f64 = 5.0;
     after_help = "Examples:\n  kagome frame mask/job.nc\n  kagome frame mask/job.nc --power 1 --times 3\n\nIt is sent as any job is: Ctrl-C holds the machine and sees its beam off."
 )]
 pub struct FrameArgs {
-    /// The job: a G-code file
-    job: PathBuf,
-    /// The machine's port [default: the one that this machine was on last]
-    #[arg(long)]
-    port: Option<String>,
-    /// The machine's profile [default: the one that the job's header names]
-    #[arg(long, value_name = "NAME|FILE")]
-    machine: Option<String>,
-    /// Rate of the serial line [default: the profile's]
-    #[arg(long)]
-    baud: Option<u32>,
+    #[command(flatten)]
+    at: JobAt,
     /// Power of the beam on the way, per cent, at most 5; 0 is dark. It is dynamic (M4): off whenever the head stands
     #[arg(long, default_value_t = 0.0, value_name = "PERCENT")]
     power: f64,
@@ -46,9 +36,7 @@ pub struct FrameArgs {
 /// # Errors
 /// [`Failure`]: a job that burns nothing, a power that would mark, a machine that refuses.
 pub fn run(args: &FrameArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
-    let text = std::fs::read(&args.job)
-        .map_err(|e| Failure::Bad(format!("cannot read {}: {e}", args.job.display())))?;
-    let machine = machine_for(args.machine.as_deref(), &text)?;
+    let (text, machine) = args.at.read()?;
     if let Some(m) = machine.as_ref().filter(|m| !m.controller.is_streamed()) {
         return Err(Failure::Bad(format!(
             "machine {} has {}, which frames jobs on its own screen",
@@ -71,6 +59,11 @@ pub fn run(args: &FrameArgs, global: &Global, terminal: &Terminal) -> Result<(),
     let s = match (args.power > 0.0, s_max) {
         (false, _) => None,
         (true, Some(s_max)) => Some(0.01 * args.power * s_max),
+        (true, None) if machine.as_ref().is_some_and(|m| m.plasma().is_some()) => {
+            return Err(Failure::Bad(
+                "a torch has no faint beam: frame the job dark, without --power".into(),
+            ));
+        }
         (true, None) => {
             return Err(Failure::Bad(
                 "how much power that is depends on the machine: name its profile with --machine"
@@ -78,37 +71,39 @@ pub fn run(args: &FrameArgs, global: &Global, terminal: &Terminal) -> Result<(),
             ));
         }
     };
-    let reach = JobReach::of(&String::from_utf8_lossy(&text));
+    let reach = JobReach::of(
+        &String::from_utf8_lossy(&text),
+        machine.as_ref().map_or(Dialect::Laser, Dialect::of),
+    );
     let Some([low, high]) = reach.and_then(|r| r.burnt_mm) else {
         return Err(Failure::Bad(format!(
             "{} burns nothing: there is nothing to frame",
-            args.job.display()
+            args.at.job.display()
         )));
     };
-    let job = around(low, high, s, args.feed, args.times);
-    let job = Job::check(job.as_bytes(), &JobRules::default()).map_err(Failure::bad)?;
-    let name = machine.as_ref().map(|m| m.name.as_str());
-    let port = port_of(args.port.as_deref(), name)?;
+    let way = around(low, high, s, args.feed, args.times);
+    let reach = JobReach::of(&way, Dialect::Laser);
+    let job = Job::check(
+        way.as_bytes(),
+        &machine
+            .as_ref()
+            .map_or_else(JobRules::default, JobRules::of),
+    )
+    .map_err(Failure::bad)?;
+    let port = args.at.port(machine.as_ref())?;
     let options = SendOptions {
         s_max,
+        made_for: machine.clone().map(|m| Box::new((m, reach))),
         buffer: machine
             .as_ref()
             .and_then(|m| Some(m.connection.as_ref()?.receive_buffer_bytes as usize)),
         ..SendOptions::default()
     };
-    let Some(guard) = terminal.forbid_exit() else {
-        return Err(Failure::Bad(
-            "Ctrl-C cannot be caught here, so a running job could not be stopped with proof; nothing was sent".into(),
-        ));
-    };
-    let mut line = port_args::open(&port, args.baud, machine.as_ref())?;
-    let result = send(line.as_mut(), &job, &options, &Unattended(terminal));
-    drop(guard);
-    terminal.clear();
-    result.map_err(failure)?;
-    if let (Some(given), Some(machine)) = (&args.port, name) {
-        remember(given, machine, terminal);
-    }
+    port.open(machine.as_ref(), terminal, |line| {
+        send(line, &job, &options, &Unattended(terminal))
+    })?
+    .map_err(failure)?;
+    port.remember(machine.as_ref(), terminal);
     if global.json {
         return print_json(
             &serde_json::json!({ "low_mm": low, "high_mm": high, "power_percent": args.power }),

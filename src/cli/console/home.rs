@@ -2,7 +2,8 @@
 
 use clap::Args;
 
-use super::{ConsoleArgs, at_machine, tell};
+use super::{at_machine, tell};
+use crate::cli::port_args::PortArgs;
 use crate::cli::{Failure, Global, Terminal};
 
 /// Run the homing cycle, dark
@@ -12,7 +13,7 @@ use crate::cli::{Failure, Global, Terminal};
 )]
 pub struct HomeArgs {
     #[command(flatten)]
-    at: ConsoleArgs,
+    port: PortArgs,
 }
 
 /// Runs the verb.
@@ -20,6 +21,6 @@ pub struct HomeArgs {
 /// # Errors
 /// [`Failure`]: it does not home, or a switch was not found.
 pub fn run(args: &HomeArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
-    let status = at_machine(&args.at.port, terminal, |console| console.home())?;
+    let status = at_machine(&args.port, terminal, |console, _| console.home())?;
     tell(&status, "homed", global)
 }

@@ -2,7 +2,8 @@
 
 use clap::{Args, ValueEnum};
 
-use super::{ConsoleArgs, at_machine, tell};
+use super::{at_machine, tell};
+use crate::cli::port_args::PortArgs;
 use crate::cli::{Failure, Global, Terminal};
 use crate::control::{JogTo, Move};
 
@@ -24,7 +25,7 @@ enum ToArg {
 )]
 pub struct JogArgs {
     #[command(flatten)]
-    at: ConsoleArgs,
+    port: PortArgs,
     /// Millimetres along X
     #[arg(long, allow_negative_numbers = true, value_name = "MM")]
     x: Option<f64>,
@@ -62,6 +63,6 @@ pub fn run(args: &JogArgs, global: &Global, terminal: &Terminal) -> Result<(), F
             "name an axis, --x, --y or --z, with a plain number of millimetres, and a --feed above zero".into(),
         ));
     }
-    let status = at_machine(&args.at.port, terminal, |console| console.jog(&by))?;
+    let status = at_machine(&args.port, terminal, |console, _| console.jog(&by))?;
     tell(&status, "moved", global)
 }

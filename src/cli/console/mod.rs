@@ -8,29 +8,20 @@ pub mod status;
 pub mod unlock;
 pub mod zero;
 
-use clap::Args;
-
 use super::port_args::PortArgs;
 use super::{Failure, Global, Terminal, print, print_json};
 use crate::control::{Console, ConsoleError, Status, Transport, work_mm};
+use crate::machine::Machine;
 
-/// What the verbs that move or change something have in common.
-#[derive(Args, Clone, Debug)]
-pub struct ConsoleArgs {
-    #[command(flatten)]
-    port: PortArgs,
-}
-
-/// Opens the port and does something at the machine. While it lasts no number of Ctrl-C ends the program: each asks for the
-/// stop that belongs to what is being done.
+/// Opens the port and does something at the machine, which is of this profile.
 fn at_machine<T>(
     args: &PortArgs,
     terminal: &Terminal,
-    act: impl FnOnce(&mut Console<'_>) -> Result<T, ConsoleError>,
+    act: impl FnOnce(&mut Console<'_>, &Machine) -> Result<T, ConsoleError>,
 ) -> Result<T, Failure> {
-    with_line(args, terminal, |line| {
+    with_line(args, terminal, |line, machine| {
         let mut console = Console::open(line, terminal)?;
-        act(&mut console)
+        act(&mut console, machine)
     })
 }
 
@@ -38,20 +29,13 @@ fn at_machine<T>(
 fn with_line<T>(
     args: &PortArgs,
     terminal: &Terminal,
-    act: impl FnOnce(&mut dyn Transport) -> Result<T, ConsoleError>,
+    act: impl FnOnce(&mut dyn Transport, &Machine) -> Result<T, ConsoleError>,
 ) -> Result<T, Failure> {
-    let Some(guard) = terminal.forbid_exit() else {
-        return Err(Failure::Bad(
-            "Ctrl-C cannot be caught here, so that a motion could not be stopped; nothing was sent"
-                .into(),
-        ));
-    };
-    let mut line = args.open()?;
-    let result = act(line.as_mut());
-    drop(guard);
-    terminal.clear();
+    let machine = args.profile()?;
+    let port = args.port(&machine)?;
+    let result = port.open(Some(&machine), terminal, |line| act(line, &machine))?;
     let done = result.map_err(failure)?;
-    args.remember(terminal);
+    port.remember(Some(&machine), terminal);
     Ok(done)
 }
 

@@ -9,7 +9,7 @@ use super::at_machine;
 use crate::base::atomic::write_file;
 use crate::base::progress::Progress as _;
 use crate::cli::port_args::PortArgs;
-use crate::cli::terminal::agrees;
+use crate::cli::question::agrees;
 use crate::cli::{Failure, Global, Terminal, print, print_json};
 use crate::control::{ControllerSettings, SettingDifference};
 
@@ -63,7 +63,7 @@ pub fn run(args: &SettingsArgs, global: &Global, terminal: &Terminal) -> Result<
         What::Save { file, port, force } => save(file, port, *force, global, terminal),
         What::Compare { file, port } => {
             let wanted = read(file)?;
-            let now = at_machine(port, terminal, |console| console.settings())?;
+            let now = at_machine(port, terminal, |console, _| console.settings())?;
             let differences = now.differences(&wanted);
             show(&differences, global)?;
             if differences.is_empty() {
@@ -93,11 +93,11 @@ fn save(
             file.display()
         )));
     }
-    let machine = port.profile()?;
-    let (settings, told) = at_machine(port, terminal, |console| {
-        Ok((console.settings()?, console.told()?))
+    let (settings, heading) = at_machine(port, terminal, |console, machine| {
+        let build = console.told()?.build.join("\n");
+        let heading = format!("settings of {}\n{build}", machine.name);
+        Ok((console.settings()?, heading))
     })?;
-    let heading = format!("settings of {}\n{}", machine.name, told.build.join("\n"));
     write_file(file, settings.to_text(&heading).as_bytes()).map_err(Failure::bad)?;
     if global.json {
         return print_json(&serde_json::json!({ "file": file, "settings": settings.len() }));
@@ -127,7 +127,7 @@ fn restore(
         ));
     }
     let mut agreed = true;
-    let restored = at_machine(port, terminal, |console| {
+    let restored = at_machine(port, terminal, |console, _| {
         let differences: Vec<SettingDifference> = console
             .settings()?
             .differences(&wanted)

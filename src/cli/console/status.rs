@@ -22,14 +22,15 @@ pub struct StatusArgs {
 /// # Errors
 /// [`Failure`]: no controller answers.
 pub fn run(args: &StatusArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
-    let machine = args.port.profile()?;
-    let (status, told, settings, banner) = at_machine(&args.port, terminal, |console| {
-        let settings = console.settings()?;
-        let told = console.told()?;
-        let status = console.status()?;
-        Ok((status, told, settings, console.banner.clone()))
-    })?;
-    let survey = Survey::settings(&|number| settings.number(number), &machine);
+    let (status, told, survey, machine, banner) =
+        at_machine(&args.port, terminal, |console, machine| {
+            let settings = console.settings()?;
+            let survey = Survey::settings(&|number| settings.number(number), machine);
+            let told = console.told()?;
+            let status = console.status()?;
+            let name = machine.name.clone();
+            Ok((status, told, survey, name, console.banner.clone()))
+        })?;
     if global.json {
         return print_json(&serde_json::json!({
             "state": format!("{:?}", status.state),
@@ -38,7 +39,7 @@ pub fn run(args: &StatusArgs, global: &Global, terminal: &Terminal) -> Result<()
             "s": status.s,
             "banner": banner,
             "told": told,
-            "profile": machine.name,
+            "profile": machine,
             "differs": survey.warned,
         }));
     }
@@ -51,7 +52,7 @@ pub fn run(args: &StatusArgs, global: &Global, terminal: &Terminal) -> Result<()
         });
     }
     lines.push(format!("modes {}", told.modes));
-    for (name, values) in &told.offsets {
+    for (name, values) in told.offsets.iter() {
         if values.iter().any(|v| *v != 0.0) {
             let values: Vec<String> = values.iter().map(ToString::to_string).collect();
             lines.push(format!("{name} {}", values.join(" ")));
@@ -59,7 +60,7 @@ pub fn run(args: &StatusArgs, global: &Global, terminal: &Terminal) -> Result<()
     }
     lines.extend(told.build);
     if survey.warned.is_empty() {
-        lines.push(format!("set as the profile {} says", machine.name));
+        lines.push(format!("set as the profile {machine} says"));
     }
     lines.extend(survey.warned.iter().map(|w| format!("differs: {w}")));
     print(&(lines.join("\n") + "\n"))

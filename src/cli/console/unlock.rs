@@ -2,7 +2,8 @@
 
 use clap::Args;
 
-use super::{ConsoleArgs, tell, with_line};
+use super::{tell, with_line};
+use crate::cli::port_args::PortArgs;
 use crate::cli::{Failure, Global, Terminal};
 use crate::control::Console;
 
@@ -13,7 +14,7 @@ use crate::control::Console;
 )]
 pub struct UnlockArgs {
     #[command(flatten)]
-    at: ConsoleArgs,
+    port: PortArgs,
     /// Reset the controller first: after a limit switch was hit it hears nothing else. A moving machine loses its position
     #[arg(long)]
     reset: bool,
@@ -24,7 +25,7 @@ pub struct UnlockArgs {
 /// # Errors
 /// [`Failure`]: no controller answers, or a limit switch is still pressed.
 pub fn run(args: &UnlockArgs, global: &Global, terminal: &Terminal) -> Result<(), Failure> {
-    let status = with_line(&args.at.port, terminal, |line| {
+    let status = with_line(&args.port, terminal, |line, _| {
         let mut console = if args.reset {
             Console::open_with_reset(line, terminal)?
         } else {

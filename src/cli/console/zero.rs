@@ -2,7 +2,8 @@
 
 use clap::Args;
 
-use super::{ConsoleArgs, at_machine, tell};
+use super::{at_machine, tell};
+use crate::cli::port_args::PortArgs;
 use crate::cli::{Failure, Global, Terminal};
 
 /// Say where the head stands: the work zero (G54), kept in the controller's memory
@@ -12,7 +13,7 @@ use crate::cli::{Failure, Global, Terminal};
 )]
 pub struct ZeroArgs {
     #[command(flatten)]
-    at: ConsoleArgs,
+    port: PortArgs,
     /// X of the work here, millimetres [default: 0, if no axis is named]
     #[arg(long, allow_negative_numbers = true, value_name = "MM")]
     x: Option<f64>,
@@ -38,6 +39,6 @@ pub fn run(args: &ZeroArgs, global: &Global, terminal: &Terminal) -> Result<(), 
             "a place is a plain number of millimetres".into(),
         ));
     }
-    let status = at_machine(&args.at.port, terminal, |console| console.set_zero(here))?;
+    let status = at_machine(&args.port, terminal, |console, _| console.set_zero(here))?;
     tell(&status, "zero is set", global)
 }

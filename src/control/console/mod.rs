@@ -11,6 +11,7 @@ mod settings;
 use std::io;
 use std::time::Duration;
 
+use super::offsets::Offsets;
 use super::reply::{MachineState, Reply, Status};
 use super::send::{Link, error_words};
 use super::{Transport, stranger};
@@ -109,7 +110,7 @@ pub struct Told {
     /// Modes in force (`$G`).
     pub modes: String,
     /// Offsets by name (`$#`), in its own unit.
-    pub offsets: Vec<(String, Vec<f64>)>,
+    pub offsets: Offsets,
 }
 
 impl<'a> Console<'a> {
@@ -328,14 +329,7 @@ impl<'a> Console<'a> {
             .into_iter()
             .find_map(|line| Some(line.strip_prefix("[GC:")?.strip_suffix(']')?.to_owned()))
             .unwrap_or_default();
-        let offsets = text(self.ask("$#")?)
-            .into_iter()
-            .filter_map(|line| {
-                let (name, values) = line.strip_prefix('[')?.strip_suffix(']')?.split_once(':')?;
-                let numbers = values.split([',', ':']).map(|v| v.parse::<f64>().ok());
-                Some((name.to_owned(), numbers.collect::<Option<Vec<f64>>>()?))
-            })
-            .collect();
+        let offsets = Offsets::of(&self.ask("$#")?);
         Ok(Told {
             build,
             modes,

@@ -201,7 +201,9 @@ impl Console<'_> {
         }
         let mut restored = Restored::default();
         let mut wanted = Settings::default();
-        for difference in differences {
+        // Soft limits ($20) are refused while homing ($22) is off.
+        let (homing, rest): (Vec<_>, Vec<_>) = differences.iter().partition(|d| d.number == 22);
+        for difference in homing.into_iter().chain(rest) {
             let (Some(value), Some(_)) = (&difference.file, &difference.controller) else {
                 continue;
             };

@@ -41,6 +41,8 @@ pub struct Follower<'a> {
     /// What the last report allowed, seen from `passed`.
     last: Option<Place>,
     proven: usize,
+    /// Reports prove nothing but how far off they are.
+    at_rest_only: bool,
 }
 
 impl<'a> Follower<'a> {
@@ -58,12 +60,20 @@ impl<'a> Follower<'a> {
             },
             last: None,
             proven: 0,
+            at_rest_only: false,
         }
     }
 
     /// Cuts that are made, of the first so many.
     pub fn proven(&self) -> usize {
         self.proven
+    }
+
+    /// Reports have turned out coarser than the tolerance, so the machine's true place is not always among those allowed.
+    /// From now on only [`Follower::rested`] proves cuts.
+    pub fn prove_at_rest_only(&mut self) {
+        self.at_rest_only = true;
+        self.last = None;
     }
 
     /// A report shows the head at `at_mm`, work coordinates, when no more than the first `sent` lines of the job had been
@@ -77,6 +87,17 @@ impl<'a> Follower<'a> {
                 self.start_mm = Some(first.to);
             }
             return Sighting::Beginning;
+        }
+        if self.passed.piece == end
+            && let Some(last) = end.checked_sub(1)
+        {
+            // Everything sent is done: it waits where that has ended.
+            let by_mm = distance(self.piece(last).to, at_mm);
+            return if by_mm <= self.tolerance_mm {
+                Sighting::OnTheWay
+            } else {
+                Sighting::Astray { by_mm }
+            };
         }
         let mut nearest = f64::INFINITY;
         let mut found = None;
@@ -103,6 +124,9 @@ impl<'a> Follower<'a> {
                 Sighting::Astray { by_mm: nearest }
             };
         };
+        if self.at_rest_only {
+            return Sighting::OnTheWay;
+        }
         if let Some(last) = self.last {
             // Both were looked for from the same place, so the earlier of them holds whichever is damaged.
             let both = if last < found { last } else { found };

@@ -58,7 +58,7 @@ pub(super) fn pieces(job: &Job) -> Result<Vec<Piece>, NotFollowed> {
     }
     // Lines of the text are counted from 1, and one was put before the job's.
     let index = |line: usize| line.saturating_sub(2);
-    let program = gcode::read(&text);
+    let program = gcode::read_as(&text, job.dialect());
     if let Some(finding) = program
         .findings
         .iter()

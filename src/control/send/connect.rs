@@ -6,13 +6,18 @@ use std::time::Duration;
 
 use super::reason::error_words;
 use super::{ANSWER, RESET, SendError, Sender};
-use crate::control::reply::{MachineState, Reply, Status, triple};
+use crate::base::units::short;
+use crate::control::offsets::Offsets;
+use crate::control::reply::{MachineState, Reply, Status};
 use crate::control::stranger;
 use crate::control::survey::Survey;
 use crate::machine;
 
 /// The largest receive buffer believed, bytes: what grblHAL and FluidNC boards tell at the most.
 const LARGEST_BUFFER: usize = 1024;
+
+/// The coarsest reports by which a job can be followed, mm: less than makes a head astray.
+const COARSEST_MM: f64 = 2.0 * super::prove::ASTRAY_MM;
 
 /// What was heard before anything was.
 pub(super) const NOTHING: &str = "nothing was heard";
@@ -42,22 +47,38 @@ pub(super) struct Facts {
 }
 
 impl Facts {
+    /// How high the head stands, machine coordinates, mm.
+    pub(super) fn height_mm(&self) -> Option<f64> {
+        let status = self.position_mm.as_ref()?;
+        let z = status.position_mm?[2];
+        Some(if status.is_work {
+            z + self.offset_mm[2]
+        } else {
+            z
+        })
+    }
+
+    /// How far it leaves its limit switches when it homes, mm.
+    pub(super) fn pull_off_mm(&self) -> f64 {
+        let way = self.settings.get(&27).copied().unwrap_or(1.0);
+        way.clamp(0.0, 10.0)
+    }
+
     fn setting(&self) -> impl Fn(u32) -> Option<f64> + '_ {
         |number| self.settings.get(&number).copied()
     }
 }
 
-/// How far a report may be from where the job says the head is: half of the last decimal in each axis, an end rounded to
+/// How far a report may be from where the job says the head is, but for the rounding of the report: an end rounded to
 /// steps and the head a step off the straight line, and the chords of arcs, the controller's and ours.
 fn tolerance_mm(setting: &dyn Fn(u32) -> Option<f64>) -> f64 {
     // Boards that do not tell their steps are taken for coarse ones.
     const COARSE: f64 = 20.0;
-    const DECIMALS_MM: f64 = 0.0013;
     const CHORDS_MM: f64 = 0.004;
     const SLACK_MM: f64 = 0.01;
     let step = |number| 1.0 / setting(number).filter(|v| *v > 0.0).unwrap_or(COARSE);
     let arc = setting(12).unwrap_or(0.002).clamp(0.0, 1.0);
-    1.5 * step(100).hypot(step(101)) + arc + DECIMALS_MM + CHORDS_MM + SLACK_MM
+    1.5 * step(100).hypot(step(101)) + arc + CHORDS_MM + SLACK_MM
 }
 
 impl Sender<'_> {
@@ -138,6 +159,17 @@ impl Sender<'_> {
 
     /// Sends a question and collects what is said until `ok`.
     pub(super) fn ask(&mut self, question: &str) -> Result<Vec<Reply>, SendError> {
+        self.try_ask(question)?
+            .map_err(|number| SendError::NotReady {
+                why: format!(
+                    "the controller answers {question} with error {number}: {}",
+                    error_words(number)
+                ),
+            })
+    }
+
+    /// The same; the inner error is the number of the controller's.
+    fn try_ask(&mut self, question: &str) -> Result<Result<Vec<Reply>, u32>, SendError> {
         let lost = |port: String, source| SendError::Connect { port, source };
         let text = format!("{question}\n");
         self.link
@@ -152,15 +184,8 @@ impl Sender<'_> {
                 .reply_before(deadline)
                 .map_err(|source| lost(self.port(), source))?
             {
-                Some(Reply::Ok) => return Ok(answer),
-                Some(Reply::Error(number)) => {
-                    return Err(SendError::NotReady {
-                        why: format!(
-                            "the controller answers {question} with error {number}: {}",
-                            error_words(number)
-                        ),
-                    });
-                }
+                Some(Reply::Ok) => return Ok(Ok(answer)),
+                Some(Reply::Error(number)) => return Ok(Err(number)),
                 Some(reply) => answer.push(reply),
                 None => {
                     return Err(SendError::NoController {
@@ -207,11 +232,24 @@ impl Sender<'_> {
             }
         }
         let setting = |number: u32| settings.get(&number).copied();
-        if setting(32) != Some(1.0) {
+        if self.job.is_torch() && setting(32) != Some(0.0) {
+            return not_ready(
+                "the controller is in laser mode, or does not tell ($32): it would put the torch out on every rapid, also between the pierce and the cut. Set $32=0, then send again"
+                    .into(),
+            );
+        }
+        if !self.job.is_torch() && setting(32) != Some(1.0) {
             return not_ready(
                 "the controller is not in laser mode ($32=1): its beam would stay on between cuts and in a pause. Set $32=1, then send again"
                     .into(),
             );
+        }
+        // grblHAL: how long a spindle gets to run up after a hold or the door.
+        if let Some(run_up_s) = setting(392).filter(|s| self.job.is_torch() && *s > 0.0) {
+            self.progress.note(&format!(
+                "warning: after a pause this controller lights the torch and stands for {} s before it moves ($392): set $392=0",
+                short(run_up_s, 1)
+            ));
         }
         let Some(s_max) = setting(30) else {
             return not_ready("the controller does not tell its full power ($30)".into());
@@ -252,11 +290,34 @@ impl Sender<'_> {
             settings: settings.clone(),
         };
         self.link.unit_mm = facts.unit_mm;
+        if self.job.is_torch() {
+            self.tells_output()?;
+        }
         if self.cuts.is_some_and(|cuts| !cuts.is_empty()) {
             self.locate(&mut facts)?;
         }
         self.survey_settings(&facts)?;
         Ok(facts)
+    }
+
+    /// Without laser mode a stop is only proven by reports that tell what is switched on: the controller must give them.
+    fn tells_output(&mut self) -> Result<(), SendError> {
+        // GRBL tells in every tenth report at rest.
+        const REPORTS: u32 = 25;
+        for _ in 0..REPORTS {
+            match self.ask_status()?.lit() {
+                Some(false) => return Ok(()),
+                Some(true) => {
+                    return Err(SendError::NotReady {
+                        why: "the machine reports that its output is on already: switch it off (M5), then try again".into(),
+                    });
+                }
+                None => {}
+            }
+        }
+        Err(SendError::NotReady {
+            why: "the controller's reports do not tell what is switched on (A: beside Ov:), so it could not be proven that a stop puts the torch out: switch these reports on ($10 on grblHAL), or use a firmware that has them".into(),
+        })
     }
 
     /// Tells what is set otherwise than the machine's profile says.
@@ -268,16 +329,25 @@ impl Sender<'_> {
     }
 
     /// Refuses a job that would leave the travel from where its zero point lies.
-    pub(super) fn survey_travel(&self, facts: &Facts) -> Result<(), SendError> {
-        let Some((machine, Some(reach))) = self.options.made_for.as_deref() else {
+    pub(super) fn survey_travel(&mut self, facts: &Facts) -> Result<(), SendError> {
+        let options = self.options;
+        let Some((machine, Some(reach))) = options.made_for.as_deref() else {
             return Ok(());
         };
-        // FluidNC has each axis's range in a file of its own.
-        if machine.controller == machine::Controller::FluidNc || facts.position_mm.is_none() {
+        if facts.position_mm.is_none() {
             return Ok(());
         }
         let mut survey = Survey::default();
-        survey.travel(&facts.setting(), &facts.letters, reach, facts.offset_mm);
+        if machine.controller == machine::Controller::FluidNc {
+            let mut told = Vec::new();
+            for key in Survey::TRAVEL_OF_FILE {
+                // A version that does not know a key refuses it.
+                told.extend(self.try_ask(key)?.unwrap_or_default());
+            }
+            survey.travel_of_file(&told, reach, facts.offset_mm);
+        } else {
+            survey.travel(&facts.setting(), &facts.letters, reach, facts.offset_mm);
+        }
         self.judge(&survey)
     }
 
@@ -293,23 +363,30 @@ impl Sender<'_> {
 
     /// Where the job's zero point lies, and where the head stands.
     pub(super) fn locate(&mut self, facts: &mut Facts) -> Result<(), SendError> {
-        let mut offset_mm = [0.0; 3];
-        for reply in self.ask("$#")? {
-            if let Reply::Message(text) = reply
-                && let Some((name, values)) = text
-                    .trim_start_matches('[')
-                    .trim_end_matches(']')
-                    .split_once(':')
-                && (name == facts.system || name == "G92")
-                && let Some(values) = triple(values)
-            {
-                for (sum, value) in offset_mm.iter_mut().zip(values) {
-                    *sum += value * facts.unit_mm;
-                }
-            }
+        let told = Offsets::of(&self.ask("$#")?);
+        let Some(zero) = told.zero(&facts.system) else {
+            return Err(SendError::NotReady {
+                why: format!(
+                    "the controller does not tell where the job's zero point lies ({} in $#): try again",
+                    facts.system
+                ),
+            });
+        };
+        facts.offset_mm = zero.map(|v| v * facts.unit_mm);
+        let status = self.ask_status()?;
+        // Both axes together; and the offset, which is told with as many decimals, where the position is the machine's.
+        let rounding_mm = 2.0 * std::f64::consts::SQRT_2 * status.rounding_mm;
+        if rounding_mm > COARSEST_MM {
+            return Err(SendError::NotReady {
+                why: format!(
+                    "the controller tells its position in steps of {} mm, so nobody can say which cuts are made: let it report millimetres ($13=0), or send the job with --no-journal",
+                    short(2.0 * status.rounding_mm, 2)
+                ),
+            });
         }
-        facts.offset_mm = offset_mm;
-        facts.position_mm = Some(self.ask_status()?);
+        let exact_mm = tolerance_mm(&facts.setting());
+        facts.tolerance_mm = exact_mm + rounding_mm;
+        facts.position_mm = Some(status);
         Ok(())
     }
 

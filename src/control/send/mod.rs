@@ -7,10 +7,12 @@
 //! | `connect` | banner and pre-flight |
 //! | `stream` | the ledger, the running job |
 //! | `prove` | cuts proven by position, written to the journal |
+//! | `dark` | a torch that is held without laser mode |
 //! | `stop` | hold, reset, proof |
 //! | `restart`, `resume` | a job that was begun before goes on |
 
 mod connect;
+mod dark;
 mod error;
 mod link;
 mod options;
@@ -28,6 +30,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::Duration;
 
 use self::connect::Facts;
+use self::dark::Watch;
 use super::follow::{Cuts, Follower};
 use super::journal::{Begin, Journal, Record};
 use super::operator::Operator;
@@ -128,6 +131,12 @@ struct Sender<'a> {
     allowed: usize,
     /// Reports in a row that showed the head astray.
     astray: u32,
+    /// How much speaks for reports that are coarser than they look.
+    doubt: f64,
+    /// They are taken for that.
+    coarse: bool,
+    /// Over the output of a torch that is held.
+    watch: Watch,
     /// The last work offset told, mm.
     offset_mm: [f64; 3],
     /// When the first line went out.
@@ -171,6 +180,9 @@ impl<'a> Sender<'a> {
             proven: 0,
             allowed: usize::MAX,
             astray: 0,
+            doubt: 0.0,
+            coarse: false,
+            watch: Watch::default(),
             offset_mm: [0.0; 3],
             started: Duration::ZERO,
         }

@@ -8,9 +8,14 @@ use crate::control::journal::Record;
 use crate::control::reply::{MachineState, Status};
 
 /// A head farther than this from the way of its job is not there by rounding, mm.
-const ASTRAY_MM: f64 = 1.0;
+pub(super) const ASTRAY_MM: f64 = 1.0;
 /// So many reports in a row must show it: one may be damaged.
 const ASTRAY_REPORTS: u32 = 3;
+/// Reports that are a little off: each adds 1 to the doubt, each other one takes so much away.
+const FORGIVEN: f64 = 0.1;
+/// From so much doubt on, the controller's reports are coarser than their decimals, and where they show the head proves
+/// nothing. Damaged ones are rarer.
+const COARSE: f64 = 3.0;
 
 impl Sender<'_> {
     /// Where a report shows the head, work coordinates, mm.
@@ -39,7 +44,24 @@ impl Sender<'_> {
     /// Looks a report up on the way of the job. `rested`: this and the report before it were asked for after everything
     /// sent had been acknowledged, and both show the machine idle.
     pub(super) fn follow(&mut self, status: &Status, rested: bool) -> Result<(), Trouble> {
-        match self.sight(status) {
+        let sighting = self.sight(status);
+        if matches!(sighting, Some(Sighting::Astray { .. })) {
+            self.doubt += 1.0;
+        } else {
+            self.doubt = (self.doubt - FORGIVEN).max(0.0);
+        }
+        if self.doubt >= COARSE
+            && !std::mem::replace(&mut self.coarse, true)
+            && let Some(follower) = &mut self.follower
+        {
+            follower.prove_at_rest_only();
+            if self.journal.is_some() {
+                self.progress.note(
+                    "the controller tells its position more coarsely than it seems, so cuts are proven only when it comes to rest: the machine will stand for a moment every few cuts",
+                );
+            }
+        }
+        match sighting {
             Some(Sighting::Astray { by_mm }) if by_mm > ASTRAY_MM => {
                 self.astray += 1;
                 if self.astray >= ASTRAY_REPORTS {

@@ -39,10 +39,12 @@ pub enum StopReason {
     },
     /// The journal cannot be written, so the job could not be resumed.
     Journal(String),
+    /// The machine is paused, and its torch could not be switched off by itself.
+    HeldOn,
     /// The job was acknowledged to its end and the machine stands, but its beam is on.
     BeamOn {
-        /// The power told, S.
-        s: f64,
+        /// The power told, S; none if only the output is known to be on.
+        s: Option<f64>,
     },
 }
 
@@ -79,9 +81,15 @@ impl fmt::Display for StopReason {
                 f,
                 "the journal cannot be written ({why}), and without it the job could not be resumed: make room on the disk"
             ),
-            Self::BeamOn { s } => write!(
+            Self::HeldOn => f.write_str(
+                "the machine is paused and was not seen to switch its torch off, neither for the spindle stop nor for the safety door",
+            ),
+            Self::BeamOn { s: Some(s) } => write!(
                 f,
                 "the job has ended but the machine reports power S{s}: its beam was on while standing"
+            ),
+            Self::BeamOn { s: None } => f.write_str(
+                "the job has ended but the machine reports that its output is on: the torch burnt while standing",
             ),
         }
     }

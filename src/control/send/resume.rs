@@ -8,6 +8,7 @@
 use std::time::Duration;
 
 use super::connect::{Facts, NOTHING};
+use super::dark::DOOR;
 use super::restart::Restart;
 use super::{RESET, SendError, SendOptions, SendReport, Sender};
 use crate::base::units::short;
@@ -15,7 +16,7 @@ use crate::control::follow::Cuts;
 use crate::control::journal::{History, Journal};
 use crate::control::operator::Operator;
 use crate::control::reply::{MachineState, Reply};
-use crate::control::{Job, Transport};
+use crate::control::{Job, JobRules, Transport};
 
 /// What only the person can know or allow.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,8 +24,11 @@ pub enum Question {
     /// The controller has lost its position and can find it by homing: may it, now?
     Home,
     /// It has lost its position and cannot home: does the head stand over the job's zero point, as it did at the
-    /// beginning?
-    ZeroHere,
+    /// beginning? A torch also has to hang clear of the sheet.
+    ZeroHere {
+        /// It is a torch.
+        torch: bool,
+    },
     /// The head was moved, dark, to where a cut begins: does it stand over that?
     AtReference {
         /// The cut, from 0.
@@ -42,8 +46,14 @@ impl std::fmt::Display for Question {
             Self::Home => f.write_str(
                 "the controller does not know where the head stands, and can find out by homing. The way to the switches must be free. May it be homed now",
             ),
-            Self::ZeroHere => f.write_str(
-                "the controller does not know where the head stands, and this machine does not home. Move it by hand over the job's zero point (X0 Y0), where it was when the job was begun. Does it stand exactly there",
+            Self::ZeroHere { torch } => write!(
+                f,
+                "the controller does not know where the head stands, and this machine does not home. Move it by hand over the job's zero point (X0 Y0), where it was when the job was begun{}. Does it stand exactly there",
+                if *torch {
+                    ", and raise the torch clear of the sheet and everything on it"
+                } else {
+                    ""
+                }
             ),
             Self::AtReference { cut, is_cut, at_mm } => write!(
                 f,
@@ -112,6 +122,16 @@ pub fn resume(
     };
     let (facts, sure) = sender.find(&place, answer)?;
     drop(sender);
+    if sure && let Some(lift) = lift_mm(job, options, &facts) {
+        // It may hang in the kerf, and the way to the next cut goes over the sheet.
+        let text = format!(
+            "M5\nG21G90G17G94{}\nG91\nG0Z{}\nG90\n",
+            facts.system,
+            short(lift, 3)
+        );
+        progress.note("the torch is raised first");
+        go_dark(transport, &text, &facts, (options, progress))?;
+    }
     if !sure {
         let (cut, is_cut) = (history.proven.saturating_sub(1), history.proven > 0);
         visit(
@@ -158,16 +178,49 @@ fn visit(
         short(at_mm[0], 4),
         short(at_mm[1], 4)
     );
-    let way = Job::check(text.as_bytes(), &crate::control::JobRules::default())
-        .map_err(|error| not_ready(&error.to_string()))?;
     progress.note("the head goes to a point of the job with the beam off");
-    Sender::new(transport, &way, options, progress).run(facts)?;
+    go_dark(transport, &text, facts, (options, progress))?;
     if answer(&Question::AtReference { cut, is_cut, at_mm }) {
         return Ok(());
     }
     Err(not_ready(
         "the head does not stand over the job's cut, so the rest would be cut in the wrong place: set the job's zero point again, and resume once more. The beam was never on",
     ))
+}
+
+/// A few lines that only move.
+fn go_dark(
+    transport: &mut dyn Transport,
+    text: &str,
+    facts: &Facts,
+    (options, progress): (&SendOptions, &dyn Operator),
+) -> Result<(), SendError> {
+    let way =
+        Job::check(text.as_bytes(), &JobRules::default()).map_err(|error| SendError::NotReady {
+            why: error.to_string(),
+        })?;
+    Sender::new(transport, &way, options, progress).run(facts)?;
+    Ok(())
+}
+
+/// How far a torch is raised before it travels, mm: as far as between two cuts, but not beyond the upper end of its travel,
+/// where that is known. None if there is nothing to raise.
+fn lift_mm(job: &Job, options: &SendOptions, facts: &Facts) -> Option<f64> {
+    /// Where the profile does not say.
+    const LIFT_MM: f64 = 10.0;
+    if !job.is_torch() {
+        return None;
+    }
+    let machine = options.made_for.as_deref().map(|(machine, _)| machine);
+    let lift = machine
+        .and_then(|m| m.plasma()?.safe_height_mm)
+        .unwrap_or(LIFT_MM);
+    // A homed Z axis ends at 0, less the way by which it leaves its switch ($27).
+    let room = facts.height_mm().filter(|_| facts.homes).map(|z| {
+        let end = -facts.pull_off_mm();
+        if z <= 0.0 { (end - z).max(0.0) } else { lift }
+    });
+    Some(room.map_or(lift, |room| lift.min(room))).filter(|lift| *lift > 0.0)
 }
 
 /// What the journal says of where the head may be.
@@ -221,7 +274,10 @@ impl Sender<'_> {
         facts.system.clone_from(&place.history.begin.system);
         self.locate(&mut facts)?;
         let then = place.history.begin.offset_mm;
-        let same_zero = (0..2).all(|k| (facts.offset_mm[k] - then[k]).abs() <= SAME_MM);
+        // Of a laser the height does not matter.
+        let axes = if self.job.is_torch() { 3 } else { 2 };
+        let moved = |now: [f64; 3]| (0..axes).any(|k| (now[k] - then[k]).abs() > SAME_MM);
+        let same_zero = !moved(facts.offset_mm);
         let machine_mm = facts
             .position_mm
             .as_ref()
@@ -242,7 +298,7 @@ impl Sender<'_> {
             }
             self.home()?;
             self.locate(&mut facts)?;
-            if (0..2).any(|k| (facts.offset_mm[k] - then[k]).abs() > SAME_MM) {
+            if moved(facts.offset_mm) {
                 self.progress.note(
                     "the job's zero point is not where it was when the job was begun: it is set to where it was",
                 );
@@ -254,7 +310,13 @@ impl Sender<'_> {
                     "the machine is locked: unlock it ($X), put the head over the job's zero point, and resume again",
                 ));
             }
-            if !answer(&Question::ZeroHere) {
+            if self.job.is_torch() && !self.job.probes() {
+                return Err(refused(
+                    "the controller does not know how high the torch hangs, this machine does not home, and the job does not feel for the sheet (G38): the rest cannot be cut at the right height. Set the zero point anew and cut the rest from a job of its own. Nothing was moved",
+                ));
+            }
+            let torch = self.job.is_torch();
+            if !answer(&Question::ZeroHere { torch }) {
                 return Err(refused(
                     "the controller does not know where the head stands: put the head over the job's zero point by hand, and resume again. Nothing was moved",
                 ));
@@ -279,8 +341,14 @@ impl Sender<'_> {
         })?;
         let zero = zero_mm.unwrap_or(at);
         let word = |k: usize| short(at[k] - zero[k], 4);
+        // A height that nobody has lost is kept as well; where the person shows the place, the job feels for it.
+        let height = if self.job.is_torch() && zero_mm.is_some() {
+            format!("Z{}", word(2))
+        } else {
+            String::new()
+        };
         self.ask(&format!("G21G90G94{}", facts.system))?;
-        self.ask(&format!("G92X{}Y{}", word(0), word(1)))?;
+        self.ask(&format!("G92X{}Y{}{height}", word(0), word(1)))?;
         self.locate(facts)
     }
 
@@ -369,6 +437,12 @@ impl Sender<'_> {
                             | MachineState::Door(true)
                             | MachineState::Check
                             | MachineState::Sleep => {
+                                // Whatever it waits for, it need not burn meanwhile.
+                                if self.job.is_torch() {
+                                    self.link
+                                        .send(&[DOOR])
+                                        .map_err(|source| self.connect_error(source))?;
+                                }
                                 return Err(SendError::NotReady {
                                     why: format!(
                                         "the machine is paused ({:?}): close its door, or reset it, and resume again",

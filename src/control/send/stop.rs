@@ -3,6 +3,7 @@
 use std::io;
 use std::time::Duration;
 
+use super::dark::DOOR;
 use super::reason::StopReason;
 use super::report::{Confirmed, Proof};
 use super::{ANSWER, RESET, SendError, Sender};
@@ -68,6 +69,7 @@ impl Sender<'_> {
             StopReason::Interrupted
                 | StopReason::Refused { .. }
                 | StopReason::Paused { .. }
+                | StopReason::HeldOn
                 | StopReason::BeamOn { .. }
                 | StopReason::Journal(_)
         );
@@ -89,7 +91,7 @@ impl Sender<'_> {
     pub(super) fn stop_sequence(&mut self, trusted: bool) -> io::Result<Proof> {
         let (stood, undisturbed) = self
             .link
-            .send(b"!")
+            .send(self.hold())
             .and_then(|()| self.wait_until_still(trusted))
             .unwrap_or_default();
         // Also when it does not stand: in motion a reset puts the beam out at once.
@@ -109,14 +111,25 @@ impl Sender<'_> {
         }
         let deadline = self.now() + ANSWER;
         let mut last = None;
+        let mut told_off = !self.job.is_torch();
         while self.now() < deadline {
             self.link.send(b"?")?;
             let until = self.now() + STOP_POLL;
             while let Some(reply) = self.link.reply_before(until)? {
                 if let Reply::Status(status) = reply {
                     let locked = status.state == MachineState::Alarm;
-                    let dark = status.dark_and_still();
-                    last = Some(format!("{:?}, power {:?}", status.state, status.s));
+                    // A torch's board may know no power, but it must tell what is switched on.
+                    match status.lit() {
+                        Some(lit) if self.job.is_torch() => told_off = !lit,
+                        _ => {}
+                    }
+                    let dark = told_off
+                        && (status.dark_and_still()
+                            || self.job.is_torch() && status.is_still() && status.s.is_none());
+                    last = Some(format!(
+                        "{:?}, power {:?}, output on {:?}",
+                        status.state, status.s, status.output_on
+                    ));
                     self.status = Some(status);
                     if dark && banner {
                         return Ok(Proof::BeamOff {
@@ -133,6 +146,13 @@ impl Sender<'_> {
                 (true, Some(report)) => format!("its last report was {report}"),
             },
         })
+    }
+
+    /// What brings it to rest, and where that does not do it by itself, switches the output off: without laser mode a hold
+    /// leaves it on, and the door does not.
+    fn hold(&self) -> &'static [u8] {
+        const BOTH: [u8; 2] = [b'!', DOOR];
+        if self.job.is_torch() { &BOTH } else { b"!" }
     }
 
     /// One reset; true if the banner answers it.
@@ -156,7 +176,10 @@ impl Sender<'_> {
         let mut running = false;
         while self.now() < deadline {
             // The hold is repeated as long as the machine says that it runs: a single byte may be lost.
-            self.link.send(if running { b"!?" } else { b"?" })?;
+            if running {
+                self.link.send(self.hold())?;
+            }
+            self.link.send(b"?")?;
             let until = self.now() + STOP_POLL;
             while let Some(reply) = self.link.reply_before(until)? {
                 match reply {

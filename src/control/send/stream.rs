@@ -3,15 +3,19 @@
 use std::io;
 use std::time::Duration;
 
+use super::dark::DARK_POLL;
 use super::reason::StopReason;
 use super::{Sender, Streaming, Trouble};
 use crate::control::follow::Cuts;
-use crate::control::operator::Glance;
+use crate::control::operator::{Glance, Wish};
 use crate::control::reply::{MachineState, Reply, Status};
 
 /// How often the status is asked for while only a proof is waited for: it decides how long the machine stands, and it has
 /// nothing else to do.
 const WAITING_POLL: Duration = Duration::from_millis(25);
+
+/// Idle reports at the end of a job before one must have told whether the output is on.
+const TELLING_REPORTS: u32 = 40;
 
 impl Sender<'_> {
     /// Fills the controller's buffer as far as it is known to be free, and as far as proofs allow.
@@ -66,6 +70,15 @@ impl Sender<'_> {
         });
     }
 
+    /// Whether the last report of a job proves that the output is on, or off. In laser mode its power does; without, a board
+    /// may know no power, and what is switched on is told in every tenth report only.
+    fn lit_at_end(&self, status: &Status) -> Option<bool> {
+        if self.job.is_torch() {
+            return status.lit();
+        }
+        status.s.map(|s| s != 0.0)
+    }
+
     pub(super) fn stream(&mut self, buffer: usize) -> Result<(), Trouble> {
         let mut next_poll = self.now() + self.options.poll;
         let mut asked_at: Option<Duration> = None;
@@ -85,6 +98,9 @@ impl Sender<'_> {
             }
             while let Some(wish) = self.progress.wish() {
                 self.link.send(&[wish.byte()])?;
+                if wish == Wish::Resume {
+                    self.watch.resumed(self.now());
+                }
             }
             let before = self.sent;
             self.fill(buffer)?;
@@ -94,6 +110,9 @@ impl Sender<'_> {
             let now = self.now();
             if self.held_back() {
                 next_poll = next_poll.min(now + WAITING_POLL);
+            }
+            if self.watch.is_waiting() {
+                next_poll = next_poll.min(now + DARK_POLL);
             }
             if let Some(asked) = asked_at
                 && now.saturating_sub(asked) > self.options.silence
@@ -137,11 +156,12 @@ impl Sender<'_> {
                 Reply::Status(status) => {
                     let asked = asked_at.take();
                     let state = status.state;
-                    let s = status.s;
+                    let lit = self.lit_at_end(&status);
                     rests = match asked_rested && asked.is_some() && state == MachineState::Idle {
                         true => rests + 1,
                         false => 0,
                     };
+                    self.keep_dark(&status)?;
                     self.follow(&status, rests >= 2)?;
                     self.show(&status);
                     self.status = Some(status);
@@ -185,13 +205,19 @@ impl Sender<'_> {
                     let all_answered = self.ledger.is_empty() && self.job.line(self.sent).is_none();
                     // One report may have been on its way before the last answer; the second was not.
                     if all_answered && idle_reports >= 2 {
-                        return match s {
-                            Some(0.0) => Ok(()),
-                            Some(s) => Err(Trouble::Stop(StopReason::BeamOn { s })),
-                            None => Err(Trouble::Stop(StopReason::Ledger(
-                                "the last report does not tell the power".into(),
-                            ))),
-                        };
+                        match lit {
+                            Some(false) => return Ok(()),
+                            Some(true) => {
+                                let s = self.status.as_ref().and_then(|s| s.s);
+                                return Err(Trouble::Stop(StopReason::BeamOn { s }));
+                            }
+                            None if idle_reports < TELLING_REPORTS => {}
+                            None => {
+                                return Err(Trouble::Stop(StopReason::Ledger(
+                                    "the last reports do not tell whether the beam is on".into(),
+                                )));
+                            }
+                        }
                     }
                     if all_answered {
                         next_poll = self.now();

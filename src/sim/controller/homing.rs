@@ -44,11 +44,6 @@ pub(super) struct Homing {
 }
 
 impl Homing {
-    /// Searching, not getting off.
-    fn seeks(&self) -> bool {
-        self.way.is_multiple_of(2)
-    }
-
     /// How far the controller has counted along each axis, mm, and how fast, mm/s.
     fn along(&self, now_s: f64) -> (f64, f64) {
         let count = self
@@ -115,22 +110,16 @@ impl Controller {
 
     /// On which side axis `k` has its switch: 1 or −1.
     fn switch_side(&self, k: usize) -> f64 {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a mask of 3 bits"
-        )]
-        let mask = self.settings.homing_direction_mask as u8;
-        if mask & (1 << k) == 0 { 1.0 } else { -1.0 }
+        if self.settings.homes_downwards(k) {
+            -1.0
+        } else {
+            1.0
+        }
     }
 
     /// How far the switch of axis `k` lies ahead of this place on the bed, mm; negative behind it.
     fn switch_ahead_mm(&self, k: usize, head_mm: f64) -> f64 {
-        if self.switch_side(k) > 0.0 {
-            -head_mm
-        } else {
-            head_mm + self.settings.travel_mm[k]
-        }
+        (self.settings.switch_mm(k) - head_mm) * self.switch_side(k)
     }
 
     /// Sets out on a way: the next one of a cycle, or the first of the next cycle.
@@ -253,12 +242,8 @@ impl Controller {
 
     /// What axis `k` reads a little off its switch, mm, in whole steps.
     fn homed_mm(&self, k: usize) -> f64 {
-        let pull = self.settings.homing_pull_off_mm;
-        let place = if self.switch_side(k) > 0.0 {
-            -pull
-        } else {
-            pull - self.settings.travel_mm[k]
-        };
+        let off = self.settings.homing_pull_off_mm;
+        let place = self.settings.switch_mm(k) - self.switch_side(k) * off;
         (place * self.settings.steps_per_mm[k]).round() / self.settings.steps_per_mm[k]
     }
 

@@ -1,15 +1,26 @@
 //! The ends of the travel: soft limits before a motion, switches in one.
 
-use super::Controller;
+use super::{Controller, State};
 use crate::planner::Profile;
+use crate::sim::settings::Settings;
 
 impl Controller {
-    /// GRBL's machine space is negative: from −travel to 0.
+    /// A machine that was switched on, homed, and stands where that has put it, at machine zero. (Where nothing homes, one
+    /// that was switched on.)
+    pub fn homed_at_zero(settings: Settings) -> Self {
+        let mut new = Self::new(settings);
+        if new.state == State::Alarm {
+            new.state = State::Idle;
+        }
+        new
+    }
+
+    /// Whether a place lies between the ends of every axis.
     pub(super) fn within_travel(&self, target: [f64; 3]) -> bool {
-        target
-            .iter()
-            .zip(self.settings.travel_mm)
-            .all(|(&t, travel)| t <= 0.0 && t >= -travel)
+        target.iter().enumerate().all(|(k, &t)| {
+            let [low, high] = self.settings.range_mm(k);
+            t >= low && t <= high
+        })
     }
 
     /// A motion would leave the travel (ALARM:2): what moves is brought to rest first.
@@ -42,10 +53,11 @@ impl Controller {
         let (from, to) = (self.on_bed(cut.start), self.on_bed(cut.end));
         let place_mm = (0..3)
             .filter_map(|k| {
-                let end = if to[k] > 0.0 {
-                    0.0
-                } else if to[k] < -self.settings.travel_mm[k] {
-                    -self.settings.travel_mm[k]
+                let [low, high] = self.settings.range_mm(k);
+                let end = if to[k] > high {
+                    high
+                } else if to[k] < low {
+                    low
                 } else {
                     return None;
                 };

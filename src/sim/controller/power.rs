@@ -72,7 +72,8 @@ impl Controller {
         for (k, shift) in shift_mm.into_iter().enumerate() {
             let mut head = self.zero[k] + self.position[k] + shift;
             if self.settings.homing {
-                head = head.clamp(-self.settings.travel_mm[k], 0.0);
+                let ([low, high], switch) = (self.settings.range_mm(k), self.settings.switch_mm(k));
+                head = head.clamp(low.min(switch), high.max(switch));
             }
             self.zero[k] = head - self.position[k];
         }

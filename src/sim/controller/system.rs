@@ -51,11 +51,7 @@ impl Controller {
             b"$#" => self.offsets_report(),
             b"$I" => {
                 let settings = &self.settings;
-                let info = settings.flavour.build_info(
-                    settings.planner_blocks,
-                    settings.receive_buffer,
-                    &self.owner,
-                );
+                let info = settings.flavour.build_info(settings, &self.owner);
                 for line in info {
                     self.say(&line);
                 }
@@ -190,9 +186,33 @@ impl Controller {
             }
             return Ok(());
         }
+        if let Some(answer) = self.axis_of_file(text) {
+            self.say(&answer);
+            return Ok(());
+        }
         match text.strip_prefix(b"$REPORT/STATUS=") {
             Some(value) => self.set_setting(&[b"$10=", value].concat()),
             None => self.set_setting(text),
         }
+    }
+
+    /// What FluidNC answers for what its configuration file says of an axis, as far as it is simulated.
+    fn axis_of_file(&self, text: &[u8]) -> Option<String> {
+        let key = std::str::from_utf8(text).ok()?.to_ascii_lowercase();
+        let (axis, what) = key.strip_prefix("$/axes/")?.split_once('/')?;
+        let axis = ["x", "y", "z"].iter().position(|name| *name == axis)?;
+        let settings = &self.settings;
+        let [low, high] = settings.range_mm(axis);
+        let upwards = !settings.homes_downwards(axis);
+        let value = match what {
+            "max_travel_mm" => format!("{:.3}", settings.travel_mm[axis]),
+            "soft_limits" => settings.soft_limits.to_string(),
+            // An axis without homing in the file has cycle 0.
+            "homing/cycle" => u8::from(settings.homing).to_string(),
+            "homing/positive_direction" => upwards.to_string(),
+            "homing/mpos_mm" => format!("{:.3}", if upwards { high } else { low }),
+            _ => return None,
+        };
+        Some(format!("{key}={value}"))
     }
 }

@@ -114,6 +114,26 @@ fn the_direction_mask_names_the_corner() {
 }
 
 #[test]
+fn where_homing_sets_zero_that_is_where_the_head_stands_beside_its_switches() {
+    let mut b = bench(|s| {
+        s.homing_sets_zero = true;
+        s.homing_direction_mask = 3.0;
+        s.homing_seek_mm_min = 30_000.0;
+    });
+    b.machine.push_head([200.0, 30.0, -9.0]);
+    home(&mut b);
+    assert_eq!(
+        (b.machine.position_mm(), b.machine.head_mm()),
+        ([0.0; 3], [0.0; 3])
+    );
+    // Its frame ends at its switches, a little beyond.
+    b.machine.push_head([-5.0, 900.0, 5.0]);
+    assert_eq!(b.machine.head_mm(), [-1.0, 500.0, 1.0]);
+    home(&mut b);
+    assert_eq!(b.machine.head_mm(), [0.0; 3]);
+}
+
+#[test]
 fn who_asks_meanwhile_is_told_at_the_end_that_it_homes() {
     let mut b = bench(|_| {});
     b.machine.push_head([-20.0, -20.0, 0.0]);
