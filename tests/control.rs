@@ -310,7 +310,7 @@ fn an_error_and_an_alarm_stop_the_job_with_proof() {
         ..Settings::default()
     });
     homed.write(b"$H\n");
-    homed.advance(5.0);
+    homed.advance(10.0);
     let mut link = SimTransport::new(homed);
     let text = "G21G90\nM4S500\nG1F3000\nG1X-50\nG1X50\nG1X-20\nM5\n";
     let Err(SendError::Stopped { reason, confirmed }) = run(&mut link, text) else {

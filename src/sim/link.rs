@@ -413,16 +413,16 @@ mod tests {
             ..Settings::default()
         });
         machine.write(b"$H\n");
-        machine.advance(5.0);
+        machine.advance(10.0);
         machine.write(b"G21G91\nG0X-100\n");
-        machine.advance(5.8);
+        machine.advance(10.8);
         machine.write(&[0x18]);
-        machine.advance(6.0);
+        machine.advance(11.0);
         // 100 mm/s at 500 mm/s²: 10 mm to brake.
         let lost = machine.head_mm()[0] - machine.position_mm()[0];
         assert!((lost + 10.0).abs() < 1e-6, "{lost}");
         machine.write(b"$H\n");
-        machine.advance(12.0);
+        machine.advance(22.0);
         assert_eq!(machine.head_mm(), machine.position_mm());
     }
 

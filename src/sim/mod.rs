@@ -28,4 +28,4 @@ pub use flavour::Flavour;
 pub use link::SimTransport;
 pub use modal::Spindle;
 pub use rehearse::{Rehearsal, RehearsalError, RehearsalSummary, rehearse};
-pub use settings::Settings;
+pub use settings::{Settings, Switch};

@@ -36,11 +36,11 @@ pub struct Settings {
     /// travel. GRBL is built so (`Z` of `$I`), grblHAL has bit 3 of `$22` for it, FluidNC `mpos_mm: 0` in its file. Else
     /// every axis goes from −travel to 0.
     pub homing_sets_zero: bool,
-    /// `$24`: slow homing rate, mm/min (kept and reported, without effect here).
+    /// `$24`: homing rate of the second, slow search, mm/min.
     pub homing_feed_mm_min: f64,
-    /// `$25`: homing rate, mm/min.
+    /// `$25`: homing rate of the first search and off the switch, mm/min.
     pub homing_seek_mm_min: f64,
-    /// `$26`: how long a switch must be closed, ms (kept and reported, without effect here).
+    /// `$26`: how long the head rests after each way of homing, ms.
     pub homing_debounce_ms: f64,
     /// `$27`: distance from the switch after homing, mm.
     pub homing_pull_off_mm: f64,
@@ -58,6 +58,8 @@ pub struct Settings {
     pub acceleration_mm_s2: [f64; 3],
     /// `$130`–`$132`: travel, mm.
     pub travel_mm: [f64; 3],
+    /// The switches that homing looks for, of X, Y and Z. Not a `$` setting.
+    pub switches: [Switch; 3],
     /// Where the sheet's surface lies, machine Z of the bed, mm: there and below the probe's contact is closed. None:
     /// nothing is ever touched. Not a `$` setting.
     pub surface_mm: Option<f64>,
@@ -98,6 +100,7 @@ impl Default for Settings {
             max_rate_mm_min: [6000.0, 6000.0, 3000.0],
             acceleration_mm_s2: [500.0; 3],
             travel_mm: [500.0, 500.0, 200.0],
+            switches: [Switch::Works; 3],
             surface_mm: None,
             receive_buffer: 128,
             planner_blocks: 15,
@@ -105,6 +108,18 @@ impl Default for Settings {
             baud: Some(115_200.0),
         }
     }
+}
+
+/// A switch at the end of an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Switch {
+    /// It closes where it should.
+    #[default]
+    Works,
+    /// It never closes: no plug, a broken wire.
+    Missing,
+    /// It is always closed.
+    Stuck,
 }
 
 /// One `$` setting: its number, value and how many decimals GRBL prints.
@@ -206,6 +221,22 @@ impl Settings {
     fn homing_flags(&self) -> f64 {
         let sets_zero = self.homing_sets_zero && self.flavour == Flavour::GrblHal;
         f64::from(u8::from(self.homing) + 8 * u8::from(self.homing && sets_zero))
+    }
+
+    /// Where the switch of an axis lies on the bed, mm: at the end of its way, or, where homing makes zero of the place
+    /// beside it, as far beyond that end as homing gets off it.
+    pub(crate) fn switch_mm(&self, axis: usize) -> f64 {
+        let [low, high] = self.range_mm(axis);
+        let beyond = if self.homing_sets_zero {
+            self.homing_pull_off_mm
+        } else {
+            0.0
+        };
+        if self.homes_downwards(axis) {
+            low - beyond
+        } else {
+            high + beyond
+        }
     }
 
     /// The ends of an axis in machine coordinates, mm, once it is homed.

@@ -51,6 +51,7 @@ impl Controller {
                 }
                 return;
             }
+            State::Home if door => return self.homing_fails(7),
             State::Jog if door => self.jog_cancelled = true,
             State::Jog => return self.cancel_jog(),
             // Opened again while the output comes back.

@@ -1,6 +1,7 @@
-//! The ends of the travel: soft limits before a motion, switches in one, and homing.
+//! The ends of the travel: soft limits before a motion, switches in one.
 
 use super::{Controller, State};
+use crate::planner::Profile;
 use crate::sim::settings::Settings;
 
 impl Controller {
@@ -74,36 +75,21 @@ impl Controller {
         if along_mm > running.profile.length_mm() {
             return None;
         }
-        // Place grows with time: halve the interval.
-        let (mut low, mut high) = (0.0, running.profile.duration_s());
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if running.profile.at(middle).0 < along_mm {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        Some(running.start_s + high)
+        Some(running.start_s + time_of(&running.profile, along_mm))
     }
+}
 
-    /// Homing is over: the head stands at the corner that `$23` names, a little off the switches.
-    pub(super) fn homed(&mut self) {
-        let pull = self.settings.homing_pull_off_mm;
-        self.position = std::array::from_fn(|k| {
-            if self.settings.homing_sets_zero {
-                0.0
-            } else if self.settings.homes_downwards(k) {
-                pull - self.settings.travel_mm[k]
-            } else {
-                -pull
-            }
-        });
-        self.zero = [0.0; 3];
-        self.modal.position = self.position;
-        self.state = State::Idle;
-        self.idle_delay();
-        self.starting
-            .extend(self.startup.iter().filter(|l| !l.is_empty()).cloned());
+/// When a profile has come so far, s from its start.
+pub(super) fn time_of(profile: &Profile, along_mm: f64) -> f64 {
+    // Place grows with time: halve the interval.
+    let (mut low, mut high) = (0.0, profile.duration_s());
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if profile.at(middle).0 < along_mm {
+            low = middle;
+        } else {
+            high = middle;
+        }
     }
+    high
 }

@@ -6,9 +6,10 @@
 //! buffer full; the main program, which reads one line after the other and waits where the firmware waits; and the
 //! motion, which goes on by itself.
 //!
-//! Not simulated: spindle synchronisation, parking, the motion of homing (the head is there after its time).
+//! Not simulated: spindle synchronisation, parking, switches that bounce, steps that are lost where a motion ends dead.
 
 mod hold;
+mod homing;
 mod limits;
 mod motion;
 mod overrides;
@@ -31,6 +32,7 @@ use super::settings::Settings;
 use crate::planner::{Profile, Queue};
 
 use hold::{Restore, Stop};
+use homing::Homing;
 use overrides::Overrides;
 use probe::Probing;
 
@@ -158,6 +160,7 @@ pub struct Controller {
     soft_limit_hit: bool,
     /// A jog is being cancelled.
     jog_cancelled: bool,
+    homing: Option<Homing>,
     probing: Option<Probing>,
     /// What probing found last, and whether it did.
     probed: ([f64; 3], bool),
@@ -231,6 +234,7 @@ impl Controller {
             zero: [0.0; 3],
             soft_limit_hit: false,
             jog_cancelled: false,
+            homing: None,
             probing: None,
             probed: ([0.0; 3], false),
             stop: Stop::None,
@@ -274,7 +278,10 @@ impl Controller {
     /// Where the head really is on the bed, mm: differs from [`Self::position_mm`] after a [`Self::reboot`] away from
     /// zero, until the machine is homed.
     pub fn head_mm(&self) -> [f64; 3] {
-        self.on_bed(self.position_mm())
+        match &self.homing {
+            Some(homing) => homing.head(self.now_s),
+            None => self.on_bed(self.position_mm()),
+        }
     }
 
     fn on_bed(&self, place: [f64; 3]) -> [f64; 3] {
@@ -334,6 +341,7 @@ impl Controller {
             || !self.starting.is_empty()
             || self.report_wanted
             || self.resume_s.is_some()
+            || self.homing.is_some()
             || !self.receive.is_empty()
             || self.busy_until_s > self.now_s
     }
@@ -366,6 +374,9 @@ impl Controller {
         }
         if self.busy_until_s > self.now_s {
             next = next.min(self.busy_until_s);
+        }
+        if let Some(homing) = &self.homing {
+            next = next.min(homing.due_s());
         }
         if let Some(at) = self.resume_s {
             next = next.min(at.max(self.busy_until_s));
@@ -439,6 +450,14 @@ impl Controller {
                 && running.start_s + running.profile.duration_s() <= self.now_s
             {
                 self.block_ends(running);
+                progress = true;
+            }
+            if self
+                .homing
+                .as_ref()
+                .is_some_and(|h| h.due_s() <= self.now_s)
+            {
+                self.homing_step();
                 progress = true;
             }
             if self.busy_until_s <= self.now_s && self.main_step() {

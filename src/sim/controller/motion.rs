@@ -9,6 +9,9 @@ use crate::sim::modal::{Action, Drive, Spindle};
 impl Controller {
     /// Where the head is and how fast, mm and mm/s.
     pub(super) fn whereabouts(&self) -> ([f64; 3], f64) {
+        if let Some(homing) = &self.homing {
+            return homing.belief(self.now_s, self.position);
+        }
         let (Some(running), Some((_, cut))) = (&self.running, self.queue.front()) else {
             return (self.position, 0.0);
         };

@@ -56,18 +56,26 @@ impl Controller {
         if self.life != Life::Off {
             self.power_off();
         }
-        for (zero, shift) in self.zero.iter_mut().zip(shift_mm) {
-            *zero += shift;
-        }
+        self.shift_head(shift_mm);
         self.reboot();
     }
 
     /// Somebody moves the head by hand, by so much, mm, and the controller does not notice. At rest only.
     pub fn push_head(&mut self, shift_mm: [f64; 3]) {
-        if self.running.is_none() {
-            for (zero, shift) in self.zero.iter_mut().zip(shift_mm) {
-                *zero += shift;
+        if self.running.is_none() && self.homing.is_none() {
+            self.shift_head(shift_mm);
+        }
+    }
+
+    /// Where the machine has switches its frame ends at them, and no hand moves the head further.
+    fn shift_head(&mut self, shift_mm: [f64; 3]) {
+        for (k, shift) in shift_mm.into_iter().enumerate() {
+            let mut head = self.zero[k] + self.position[k] + shift;
+            if self.settings.homing {
+                let ([low, high], switch) = (self.settings.range_mm(k), self.settings.switch_mm(k));
+                head = head.clamp(low.min(switch), high.max(switch));
             }
+            self.zero[k] = head - self.position[k];
         }
     }
 

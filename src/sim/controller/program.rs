@@ -21,9 +21,10 @@ impl Controller {
 
     /// One thing that the main program does now; false if it must wait.
     pub(super) fn main_step(&mut self) -> bool {
-        // GRBL's locked loop does not look at the wish for a report; its successors' does.
-        let mute = self.state == State::Home
-            || self.state == State::Critical && self.settings.flavour == Flavour::Grbl;
+        // GRBL's locked loop does not look at the wish for a report; its successors' does. While homing FluidNC does.
+        let flavour = self.settings.flavour;
+        let mute = self.state == State::Home && flavour != Flavour::FluidNc
+            || self.state == State::Critical && flavour == Flavour::Grbl;
         if self.report_wanted && !mute {
             self.report_wanted = false;
             self.status_report();
@@ -35,10 +36,8 @@ impl Controller {
         if self.suspended() {
             return false;
         }
-        if self.state == State::Home {
-            // Its time was spent in `busy_until_s`.
-            self.homed();
-            return true;
+        if self.homing.is_some() {
+            return false;
         }
         if let Some(action) = self.actions.pop_front() {
             return self.act(action);
@@ -244,15 +243,7 @@ impl Controller {
                 self.state = State::Sleep;
                 self.message("Sleeping");
             }
-            Action::Home => {
-                self.state = State::Home;
-                let far = self
-                    .settings
-                    .travel_mm
-                    .iter()
-                    .fold(0.0f64, |a, &t| a.max(t));
-                self.busy_until_s = self.now_s + far / (self.settings.homing_seek_mm_min / 60.0);
-            }
+            Action::Home => self.home(),
         }
         true
     }

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::{Controller, State};
 use crate::sim::modal::Spindle;
+use crate::sim::settings::Switch;
 
 /// Every how many reports the work offset and the overrides are told: less often while moving, as in the firmware.
 const OFFSET_EVERY: [u32; 2] = [10, 30];
@@ -83,8 +84,9 @@ impl Controller {
         }
         let s = self.output_s(speed);
         let _ = write!(text, "|FS:{},{s:.0}", self.rate(speed * 60.0));
-        if self.probe_pin() {
-            text.push_str("|Pn:P");
+        let pins = self.pins();
+        if !pins.is_empty() {
+            let _ = write!(text, "|Pn:{pins}");
         }
         let resting = matches!(
             self.state,
@@ -114,6 +116,21 @@ impl Controller {
         }
         text.push('>');
         self.say(&text);
+    }
+
+    /// Inputs that are closed now, as one letter each: the probe, and switches that the head presses or that are stuck.
+    fn pins(&self) -> String {
+        let head = self.head_mm();
+        let axes = ['X', 'Y', 'Z'].into_iter().enumerate();
+        let pressed = axes.filter(|&(k, _)| {
+            self.settings.homing
+                && (self.settings.switches[k] == Switch::Stuck || self.beyond(k, head[k]))
+        });
+        let probe = self.probe_pin().then_some('P');
+        probe
+            .into_iter()
+            .chain(pressed.map(|(_, letter)| letter))
+            .collect()
     }
 
     /// What is switched on now, as one letter each.

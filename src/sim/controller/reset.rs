@@ -20,6 +20,11 @@ impl Controller {
     /// The motors get no more steps. From a motion the head runs on by itself, as far as it would have taken to brake,
     /// and the controller does not know: its position is lost. A real head stops somewhere between; this is the worst.
     pub(super) fn halt(&mut self) {
+        if let Some(homing) = self.homing.take() {
+            let head = homing.head(self.now_s);
+            (self.position, _) = homing.belief(self.now_s, self.position);
+            self.zero = std::array::from_fn(|k| head[k] - self.position[k]);
+        }
         let (place, speed) = self.whereabouts();
         if let (true, Some((block, _))) = (self.running.is_some(), self.queue.front()) {
             let slide_mm = speed * speed / (2.0 * block.acceleration_mm_s2);
@@ -61,11 +66,19 @@ impl Controller {
     }
 
     pub(super) fn soft_reset(&mut self) {
-        let lost = self.braking() || matches!(self.state, State::Run | State::Home | State::Jog);
+        if self.homing.is_some() {
+            return self.homing_fails(6);
+        }
+        let lost = self.braking() || matches!(self.state, State::Run | State::Jog);
         let locked = matches!(self.state, State::Alarm | State::Critical | State::Sleep);
+        // GRBL answers the line that waited, on its way out of it: an ok for what was never done.
+        let waited = self.answer.take();
         self.restart();
         if lost {
             self.raise(3);
+        }
+        if let Some(answer) = waited.filter(|_| self.settings.flavour == Flavour::Grbl) {
+            self.say(&answer);
         }
         self.state = if lost || locked {
             State::Alarm
@@ -84,6 +97,10 @@ impl Controller {
                 2 => "Soft Limit",
                 4 => "Probe Fail Initial",
                 5 => "Probe Fail Contact",
+                6 => "Homing Fail Reset",
+                7 => "Homing Fail Door",
+                8 => "Homing Fail Pulloff",
+                9 => "Homing Fail Approach",
                 _ => "Abort Cycle",
             };
             self.message(&format!("ALARM: {name}"));

@@ -10,7 +10,7 @@ fn homed(change: impl FnOnce(&mut Settings)) -> Bench {
     };
     change(&mut settings);
     let mut b = Bench::new(settings);
-    b.send("$H\n", 5.0);
+    b.send("$H\n", 10.0);
     b.said.clear();
     b
 }

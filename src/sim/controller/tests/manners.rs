@@ -85,7 +85,7 @@ fn soft_limits_stop_the_machine_deafen_it_and_keep_the_beam_off() {
         b.send("G0X-5\n", 0.1).contains("error:9"),
         "locked until homed"
     );
-    b.send("$H\n", 5.0);
+    b.send("$H\n", 10.0);
     assert_eq!(b.machine.position_mm(), [-1.0; 3]);
     let said = b.send("M4S500\nG1X-100F3000\nG1X10\n", 5.0);
     assert!(
@@ -203,12 +203,12 @@ fn homing_finds_the_true_place_again() {
         homing_seek_mm_min: 60_000.0,
         ..Settings::default()
     });
-    b.send("$H\n", 5.0);
+    b.send("$H\n", 10.0);
     b.send("G21G91\nG0X-20\n", 5.0);
     b.machine.reboot();
     assert_eq!(b.machine.position_mm(), [0.0; 3]);
     assert_eq!(b.machine.head_mm(), [-21.0, -1.0, -1.0]);
-    b.send("$H\n", 5.0);
+    b.send("$H\n", 10.0);
     assert_eq!(b.machine.position_mm(), [-1.0; 3]);
     assert_eq!(b.machine.head_mm(), [-1.0; 3]);
 }
@@ -236,4 +236,19 @@ fn a_command_number_is_taken_apart_as_the_firmware_does() {
         "error:23\r\nerror:23\r\nerror:20\r\n"
     );
     assert_eq!(b.send("G91.1\nG92X0\nG92.1\n", 1.0), "ok\r\nok\r\nok\r\n");
+}
+
+#[test]
+fn a_line_that_waited_when_the_reset_came_is_answered_before_the_banner() {
+    let mut b = Bench::laser();
+    b.send("G4P5\n", 1.0);
+    assert!(b.raw(0x18, 0.1).starts_with("ok\r\n\r\nGrbl 1.1h"));
+    b.send("M4S5\nG1X50F600\nM5\n", 1.0);
+    assert!(
+        b.raw(0x18, 0.1)
+            .starts_with("ALARM:3\r\nok\r\n\r\nGrbl 1.1h")
+    );
+    // One that was answered already is not answered again.
+    b.send("$X\nM4S5\nG1X50F600\n", 1.0);
+    assert!(b.raw(0x18, 0.1).starts_with("ALARM:3\r\n\r\nGrbl 1.1h"));
 }

@@ -183,7 +183,7 @@ fn soft_limits_hold_in_check_mode_too() {
         homing_seek_mm_min: 60_000.0,
         ..Settings::default()
     });
-    b.send("$H\n", 5.0);
+    b.send("$H\n", 10.0);
     b.send("$C\n", 0.1);
     let said = b.send("G90G1X-100F3000\nG1X10\n", 1.0);
     assert!(said.contains("ok\r\nALARM:2"), "{said}");

@@ -2,6 +2,7 @@
 
 mod flavours;
 mod hands;
+mod homing;
 mod manners;
 mod memory;
 mod pace;
