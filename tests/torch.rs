@@ -1,11 +1,7 @@
 //! A torch on a controller without laser mode: held, it must go dark, and a stop must be proven by what is switched on.
 //! Judged by the sheet of the simulated machine, and by how long it burnt where it stood.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "helpers of tests fail by panicking"
-)]
+#![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
 
 use std::sync::Mutex;
 use std::time::Duration;
@@ -252,6 +248,7 @@ fn paused(
     let options = SendOptions {
         buffer: Some(128),
         poll: Duration::from_millis(50),
+        longest_pause: Some(Duration::from_secs(60)),
         ..SendOptions::default()
     };
     let result = send(&mut line, &job(), &options, &pauses);
@@ -284,8 +281,14 @@ fn a_torch_that_is_held_goes_dark_and_on_where_it_was() {
                     lengths.iter().all(|l| (l - LENGTH_MM).abs() < 0.05),
                     "{lengths:?}"
                 );
+                // grblHAL gives the torch time before it goes on, as the sender's warning says.
+                let run_up_s = if flavour == Flavour::GrblHal {
+                    4.1
+                } else {
+                    0.0
+                };
                 assert!(
-                    standing < PIERCE_AT_MOST_S.max(HELD_AT_MOST_S),
+                    standing < PIERCE_AT_MOST_S.max(HELD_AT_MOST_S).max(run_up_s),
                     "{standing}"
                 );
             }

@@ -110,6 +110,9 @@ impl Default for Settings {
 /// One `$` setting: its number, value and how many decimals GRBL prints.
 pub(crate) type Row = (u16, f64, usize);
 
+/// How far below the highest place of a raised torch the sheet of the machine that is built in lies, mm.
+const SHEET_BELOW_MM: f64 = 10.0;
+
 impl Settings {
     /// A laser in laser mode with these limits, bed and full-power S word; everything else as shipped.
     pub fn laser(limits: &Limits, travel_mm: [f64; 3], s_max: f64) -> Self {
@@ -153,6 +156,10 @@ impl Settings {
             },
         };
         settings = settings.with_flavour(Flavour::of(machine.controller));
+        // A sheet to be felt for, so far below the torch's highest place that it can rise over it.
+        settings.surface_mm = machine
+            .plasma()
+            .map(|torch| -(torch.safe_height_mm.unwrap_or(0.0) + SHEET_BELOW_MM));
         if let Some(connection) = &machine.connection {
             settings.receive_buffer = connection.receive_buffer_bytes as usize;
             settings.planner_blocks = connection.planner_blocks as usize;

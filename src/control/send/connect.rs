@@ -244,6 +244,13 @@ impl Sender<'_> {
                     .into(),
             );
         }
+        // grblHAL: how long a spindle gets to run up after a hold or the door.
+        if let Some(run_up_s) = setting(392).filter(|s| self.job.is_torch() && *s > 0.0) {
+            self.progress.note(&format!(
+                "warning: after a pause this controller lights the torch and stands for {} s before it moves ($392): set $392=0",
+                short(run_up_s, 1)
+            ));
+        }
         let Some(s_max) = setting(30) else {
             return not_ready("the controller does not tell its full power ($30)".into());
         };

@@ -25,6 +25,9 @@ pub(super) const DOOR: u8 = 0x84;
 /// report that tells. GRBL tells a change in the next report or the one after it, and everything in every twentieth.
 const STILL_ON: Duration = Duration::from_millis(300);
 const UNTOLD: Duration = Duration::from_secs(1);
+/// How long a resumed controller may stand with the torch on: GRBL's time for a spindle behind the door, and grblHAL's after
+/// every hold, is 4 s as it comes.
+const RUN_UP: Duration = Duration::from_millis(5500);
 /// How often the status is asked for until it is dark.
 pub(super) const DARK_POLL: Duration = Duration::from_millis(25);
 
@@ -42,6 +45,8 @@ enum Step {
     Door(Duration),
     /// It was seen to be off.
     Dark,
+    /// The person has resumed it, and the controller may give the torch time before it moves.
+    Resumed(Duration),
 }
 
 /// The watch over a held output.
@@ -51,6 +56,13 @@ pub(super) struct Watch {
 }
 
 impl Watch {
+    /// The person resumes it.
+    pub fn resumed(&mut self, now: Duration) {
+        if self.step == Step::Dark {
+            self.step = Step::Resumed(now);
+        }
+    }
+
     /// The machine is held, and it is not known yet that its output is off.
     pub fn is_waiting(self) -> bool {
         matches!(
@@ -89,6 +101,8 @@ impl Sender<'_> {
         let lit = status.lit();
         let next = match (self.watch.step, lit) {
             (Step::Dark, Some(false) | None) => return Ok(()),
+            // grblHAL lights the torch and tells Hold for as long as a spindle gets to run up.
+            (Step::Resumed(since), _) if !late(since, RUN_UP) => return Ok(()),
             (_, Some(false)) => {
                 self.progress
                     .note("the machine tells that the torch is off while it is paused");
@@ -99,7 +113,9 @@ impl Sender<'_> {
                 self.link.send(&[SPINDLE_STOP])?;
                 Step::Stopped(now)
             }
-            (Step::Moving | Step::Standing(_) | Step::Dark, Some(true)) => self.by_door(now)?,
+            (Step::Moving | Step::Standing(_) | Step::Dark | Step::Resumed(_), Some(true)) => {
+                self.by_door(now)?
+            }
             (Step::Standing(since), None) if late(since, UNTOLD) => self.by_door(now)?,
             (Step::Stopped(since), Some(true)) if late(since, STILL_ON) => self.by_door(now)?,
             (Step::Stopped(since), None) if late(since, UNTOLD) => self.by_door(now)?,

@@ -7,7 +7,7 @@ use super::dark::DARK_POLL;
 use super::reason::StopReason;
 use super::{Sender, Streaming, Trouble};
 use crate::control::follow::Cuts;
-use crate::control::operator::Glance;
+use crate::control::operator::{Glance, Wish};
 use crate::control::reply::{MachineState, Reply, Status};
 
 /// How often the status is asked for while only a proof is waited for: it decides how long the machine stands, and it has
@@ -98,6 +98,9 @@ impl Sender<'_> {
             }
             while let Some(wish) = self.progress.wish() {
                 self.link.send(&[wish.byte()])?;
+                if wish == Wish::Resume {
+                    self.watch.resumed(self.now());
+                }
             }
             let before = self.sent;
             self.fill(buffer)?;

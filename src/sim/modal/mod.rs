@@ -397,7 +397,7 @@ pub(crate) fn interpret(
                     from: next.position,
                     drive,
                     away: next.motion >= 384,
-                    strict: next.motion % 2 == 0,
+                    strict: next.motion.is_multiple_of(2),
                 }));
             }
         }
