@@ -393,7 +393,7 @@ fn the_verbs_say_what_they_did() {
         (2, "frame empty.nc --port sim", "nothing to frame"),
         (
             1,
-            "frame far.nc --port sim --machine co2-600x400",
+            "frame far.nc --port sim --machine co2-600x400 --power 2",
             "from X10 to X650 in machine coordinates, and the machine has 0 to 600",
         ),
         (0, "home --port sim", "homed"),
