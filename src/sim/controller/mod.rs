@@ -1,12 +1,14 @@
 //! The controller: bytes in, bytes out, motion and a beam, on a clock that moves only when told.
 //!
-//! Written after GRBL 1.1h; where grblHAL and FluidNC differ stands in [`Flavour`](super::Flavour). Nothing runs by ticks: [`Controller::advance`] goes from event to event (a byte arrives, a
-//! line has been read, a block ends), so a job of minutes takes milliseconds and always gives the same result. Three
-//! things run side by side, as in the firmware: the wires, which take time per byte and lose what finds the receive
-//! buffer full; the main program, which reads one line after the other and waits where the firmware waits; and the
-//! motion, which goes on by itself.
+//! Written after GRBL 1.1h; where grblHAL and FluidNC differ stands in [`Flavour`](super::Flavour). Nothing runs by
+//! ticks: [`Controller::advance`] goes from event to event (a byte arrives, a line has been read, a block ends), so a job
+//! of minutes takes milliseconds and always gives the same result. Three things run side by side, as in the firmware:
+//! the wires, which take time per byte and lose what finds the receive buffer full; the main program, which reads one
+//! line after the other and waits where the firmware waits; and the motion, which goes on by itself.
 //!
-//! Not simulated: spindle synchronisation, parking, switches that bounce, steps that are lost where a motion ends dead.
+//! Not simulated: spindle synchronisation, parking, switches that bounce, steps that are lost where homing ends dead at
+//! a switch, and the steps already made ready when a hold or a touch of the probe comes (some 50 ms on GRBL): braking
+//! begins at once.
 
 mod hold;
 mod homing;
