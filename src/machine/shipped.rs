@@ -315,7 +315,12 @@ mod tests {
                 "controller = \"grbl\"",
                 "plasma.height_control",
             ),
-            ("plasma-linuxcnc", "\"linuxcnc\"", "\"grbl\"", "controller"),
+            (
+                "plasma-linuxcnc",
+                "\"linuxcnc\"",
+                "\"grbl\"",
+                "plasma.accept_arc_on_after_lost_link",
+            ),
             (
                 "plasma-linuxcnc",
                 "safe_height_mm = 20\n",
