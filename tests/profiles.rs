@@ -227,7 +227,7 @@ fn a_controllers_answer_makes_the_profile_and_what_is_dangerous_in_it_is_said() 
 fn a_list_says_of_every_pair_whether_it_fits_and_why_not() {
     let folder = tempfile::tempdir().unwrap();
     let lists = [
-        (["--json", "machines", "list", "--material", "steel-1.5"], 3),
+        (["--json", "machines", "list", "--material", "steel-1.5"], 4),
         (["--json", "materials", "list", "--machine", "fibre-300"], 3),
     ];
     for (args, fits) in lists {
