@@ -219,6 +219,11 @@ fn a_job_that_would_leave_the_travel_is_not_begun() {
             "{error}"
         );
         dark(&line);
+        // A way round the job without a beam no more than the job.
+        let way = text.replace("M4 S500", "M5");
+        let way = Job::check(way.as_bytes(), &JobRules::default()).unwrap();
+        let error = send(&mut homed(), &way, &options, &Silent).unwrap_err();
+        assert!(error.to_string().contains("kagome zero"), "{error}");
         // With the zero where the sheet lies it is.
         let mut line = homed();
         let mut console = Console::open(&mut line, &Silent).unwrap();

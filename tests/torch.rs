@@ -9,8 +9,8 @@ use std::time::Duration;
 use kagome::base::progress::{Progress, Silent};
 use kagome::control::journal::{Header, Journal, MemoryStore};
 use kagome::control::{
-    Cuts, Glance, Job, JobError, JobRules, Operator, Proof, SendError, SendOptions, SendReport,
-    StopReason, Transport, Wish, resume, send, send_recorded,
+    Change, Cuts, Glance, Job, JobError, JobRules, Operator, Proof, SendError, SendOptions,
+    SendReport, StopReason, Transport, Wish, resume, send, send_recorded,
 };
 use kagome::material::Process;
 use kagome::sim::{At, Controller, Faults, Flavour, Mishap, Settings, SimTransport};
@@ -326,6 +326,56 @@ fn where_nothing_puts_it_out_the_job_is_stopped() {
     );
     assert!(!machine.beam_on());
     assert!(burnt(&machine).1 < 2.5);
+}
+
+/// Wishes for less power, once.
+struct Dim(Mutex<(bool, Vec<String>)>);
+
+impl Progress for Dim {
+    fn note(&self, text: &str) {
+        self.0.lock().unwrap().1.push(text.to_owned());
+    }
+}
+impl Operator for Dim {
+    fn wish(&self) -> Option<Wish> {
+        let done = std::mem::replace(&mut self.0.lock().unwrap().0, true);
+        (!done).then_some(Wish::Power(Change::Less))
+    }
+}
+
+#[test]
+fn a_torch_is_never_dimmed() {
+    let mut link = SimTransport::new(Controller::new(Settings {
+        surface_mm: Some(-30.0),
+        ..settings(Flavour::Grbl)
+    }));
+    let dim = Dim(Mutex::default());
+    let text = text().replace("G0Z4\n", "G38.2Z-50F500\nG92Z0\nG0Z4\n");
+    let job = Job::check(text.as_bytes(), &rules()).unwrap();
+    send(&mut link, &job, &SendOptions::default(), &dim).unwrap();
+    assert!(link.controller().burns().iter().all(|b| b.s == 1000.0));
+    let notes = dim.0.into_inner().unwrap().1;
+    assert!(!notes.iter().any(|n| n.contains("PRB")), "{notes:?}");
+    assert!(notes.iter().any(|n| n.contains("on or off")), "{notes:?}");
+}
+
+#[test]
+fn where_no_sheet_is_felt_the_job_is_stopped_before_the_torch_burns() {
+    // The sheet lies deeper than the probe looks for it.
+    let mut link = SimTransport::new(Controller::new(Settings {
+        surface_mm: Some(-70.0),
+        ..settings(Flavour::Grbl)
+    }));
+    let text = text().replace("G0Z4\n", "G38.2Z-50F500\nG92Z0\nG0Z4\n");
+    let job = Job::check(text.as_bytes(), &rules()).unwrap();
+    let error = send(&mut link, &job, &SendOptions::default(), &Silent).unwrap_err();
+    let SendError::Stopped { reason, confirmed } = &error else {
+        panic!("{error:?}");
+    };
+    assert_eq!(reason, &StopReason::Alarm(5));
+    assert!(matches!(confirmed.proof, Proof::BeamOff { .. }), "{error}");
+    assert!(error.to_string().contains("sheet"), "{error}");
+    assert!(link.controller().burns().is_empty());
 }
 
 /// Interrupts at a time.

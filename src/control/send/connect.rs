@@ -10,8 +10,8 @@ use crate::base::units::short;
 use crate::control::offsets::Offsets;
 use crate::control::reply::{MachineState, Reply, Status};
 use crate::control::stranger;
-use crate::control::survey::Survey;
-use crate::machine;
+use crate::control::survey::{JobReach, Survey};
+use crate::machine::{self, Machine};
 
 /// The largest receive buffer believed, bytes: what grblHAL and FluidNC boards tell at the most.
 const LARGEST_BUFFER: usize = 1024;
@@ -293,7 +293,10 @@ impl Sender<'_> {
         if self.job.is_torch() {
             self.tells_output()?;
         }
-        if self.cuts.is_some_and(|cuts| !cuts.is_empty()) {
+        let reaches = |made_for: &(Machine, Option<JobReach>)| made_for.1.is_some();
+        if self.cuts.is_some_and(|cuts| !cuts.is_empty())
+            || self.options.made_for.as_deref().is_some_and(reaches)
+        {
             self.locate(&mut facts)?;
         }
         self.survey_settings(&facts)?;

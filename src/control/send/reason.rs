@@ -117,6 +117,8 @@ pub(in crate::control) fn alarm_words(number: u32) -> &'static str {
         1 => "a limit switch was hit; position may be lost",
         2 => "the job leaves the machine's travel",
         3 => "it was reset while moving; position is lost",
+        4 => "the probe touched before it set out: is the torch on the sheet, or its switch stuck?",
+        5 => "the probe found no sheet: does it lie under the torch, and does its switch work?",
         6..=9 => "homing failed",
         _ => "see GRBL's list of alarms",
     }

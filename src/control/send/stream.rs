@@ -7,7 +7,7 @@ use super::dark::DARK_POLL;
 use super::reason::StopReason;
 use super::{Sender, Streaming, Trouble};
 use crate::control::follow::Cuts;
-use crate::control::operator::{Glance, Wish};
+use crate::control::operator::{Change, Glance, Wish};
 use crate::control::reply::{MachineState, Reply, Status};
 
 /// How often the status is asked for while only a proof is waited for: it decides how long the machine stands, and it has
@@ -97,6 +97,14 @@ impl Sender<'_> {
                 return Err(Trouble::Stop(StopReason::Interrupted));
             }
             while let Some(wish) = self.progress.wish() {
+                // A part of full power is a start contact that chatters.
+                if self.job.is_torch()
+                    && matches!(wish, Wish::Power(change) if change != Change::Reset)
+                {
+                    self.progress
+                        .note("a torch is on or off: its power is set at its source");
+                    continue;
+                }
                 self.link.send(&[wish.byte()])?;
                 if wish == Wish::Resume {
                     self.watch.resumed(self.now());
@@ -229,7 +237,11 @@ impl Sender<'_> {
                     }
                 }
                 Reply::Message(text) => {
-                    if !text.starts_with("[MSG:Pgm End") {
+                    // Of the end, and of every sheet that was felt, the person has seen enough.
+                    if !["[MSG:Pgm End", "[PRB:"]
+                        .iter()
+                        .any(|s| text.starts_with(s))
+                    {
                         self.progress.note(&text);
                     }
                 }

@@ -1,8 +1,14 @@
 //! A job, checked whole before anything is sent.
 
+mod error;
+mod words;
+
+use self::words::{read_words, strip};
 use crate::gcode::Dialect;
 use crate::machine::{Machine, Tool};
 use crate::material::Process;
+
+pub use error::JobError;
 
 /// What a job may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,125 +45,8 @@ impl JobRules {
     }
 }
 
-/// Why a job is not sent. Nothing has reached the machine.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum JobError {
-    /// No line does anything.
-    #[error("the job has no G-code in it: nothing was sent")]
-    Empty,
-    /// Not text.
-    #[error(
-        "line {line} holds the byte 0x{byte:02x}, which is not G-code: is this file a job? Nothing was sent"
-    )]
-    Binary {
-        /// Line number in the file, from 1.
-        line: usize,
-        /// The byte.
-        byte: u8,
-    },
-    /// Not ASCII.
-    #[error(
-        "line {line} holds the byte 0x{byte:02x}, which is not ASCII, and which a controller may obey the moment it arrives, also in a comment: write the line without umlauts, accents and symbols. Nothing was sent"
-    )]
-    NotAscii {
-        /// Line number, from 1.
-        line: usize,
-        /// The byte.
-        byte: u8,
-    },
-    /// A carriage return that no newline follows.
-    #[error(
-        "line {line} holds a carriage return that no newline follows: the controller would read two lines, other programs one. Save the file with line ends \\n or \\r\\n. Nothing was sent"
-    )]
-    LoneReturn {
-        /// Line number, from 1.
-        line: usize,
-    },
-    /// A wait longer than any job needs.
-    #[error(
-        "line {line} waits for {seconds} s (G4 P is in seconds), and a job may wait {limit} s at a time: while the machine waits nobody can tell it from one that has died. Write a shorter wait. Nothing was sent"
-    )]
-    Dwell {
-        /// Line number, from 1.
-        line: usize,
-        /// How long, s.
-        seconds: f64,
-        /// The limit, s.
-        limit: f64,
-    },
-    /// A character that a controller takes out of the stream and obeys at once.
-    #[error(
-        "line {line} holds {character:?}, which the controller obeys the moment it arrives, and which no job may hold: remove it. Nothing was sent"
-    )]
-    Realtime {
-        /// Line number, from 1.
-        line: usize,
-        /// The character.
-        character: char,
-    },
-    /// A line longer than the controller's memory for one.
-    #[error(
-        "line {line} has {length} characters, but the controller takes {limit}: write the job with fewer decimals. Nothing was sent"
-    )]
-    TooLong {
-        /// Line number, from 1.
-        line: usize,
-        /// Its length without spaces and comments.
-        length: usize,
-        /// The limit.
-        limit: usize,
-    },
-    /// A word that is no G-code word.
-    #[error("line {line}, {word:?}: {why}. Nothing was sent")]
-    Word {
-        /// Line number, from 1.
-        line: usize,
-        /// The word.
-        word: String,
-        /// What is wrong with it.
-        why: &'static str,
-    },
-    /// A `$` line: a command for the controller.
-    #[error(
-        "line {line} is a command for the controller ({text}), not a part of a job: send it by itself. Nothing was sent"
-    )]
-    Command {
-        /// Line number, from 1.
-        line: usize,
-        /// The line.
-        text: String,
-    },
-    /// M3 without permission.
-    #[error(
-        "line {line} switches the beam to constant power (M3): if the cable is pulled it stays on while the head stands still, and no computer can switch it off. Use M4, or add --allow-constant-power and stay beside the machine. Nothing was sent"
-    )]
-    ConstantPower {
-        /// Line number, from 1.
-        line: usize,
-    },
-    /// A torch without permission.
-    #[error(
-        "line {line} switches the torch on (M3): if the cable is pulled in mid-cut it stays on, and no computer can switch it off. If you will stay beside the table, write accept_arc_on_after_lost_link = true in its profile. Nothing was sent"
-    )]
-    Arc {
-        /// Line number, from 1.
-        line: usize,
-    },
-    /// The last word on the beam is "on".
-    #[error(
-        "line {line} switches the beam on and nothing after it switches it off: end the job with M5. Nothing was sent"
-    )]
-    BeamLeftOn {
-        /// Line of the last M3 or M4, from 1.
-        line: usize,
-    },
-}
-
 /// The longest G4, s. The sender waits so long for an answer before it calls the link dead.
 const LONGEST_DWELL_S: f64 = 600.0;
-
-/// Digits that GRBL reads of a number; it takes the others for zeros, leading zeros included: `M000000005` is M0.
-const DIGITS: usize = 8;
 
 /// Lines that are ready to be sent: no comments, no blanks, upper case.
 #[derive(Clone, Debug, PartialEq)]
@@ -353,116 +242,6 @@ impl Job {
     pub fn longest_dwell_s(&self) -> f64 {
         self.longest_dwell_s
     }
-}
-
-/// Appends a line without blanks and comments, upper case.
-fn strip(raw: &[u8], line: usize, into: &mut String) -> Result<(), JobError> {
-    let (mut paren, mut semicolon) = (false, false);
-    for &byte in raw {
-        match byte {
-            0x80.. => return Err(JobError::NotAscii { line, byte }),
-            // Realtime bytes act even inside a comment, if one were sent; comments are not, but a job that holds
-            // them should not be sent by other programs either. In a comment they are only text.
-            b' '..=b'~' | b'\t' if semicolon => {}
-            b')' if paren => paren = false,
-            b' '..=b'~' | b'\t' if paren => {}
-            b'(' => paren = true,
-            b';' => semicolon = true,
-            b' ' | b'\t' => {}
-            b'!' | b'~' | b'?' => {
-                return Err(JobError::Realtime {
-                    line,
-                    character: char::from(byte),
-                });
-            }
-            0x21..=0x7e => into.push(char::from(byte.to_ascii_uppercase())),
-            _ => return Err(JobError::Binary { line, byte }),
-        }
-    }
-    Ok(())
-}
-
-#[derive(Default)]
-struct Found {
-    m3: bool,
-    on: bool,
-    off: bool,
-    s: f64,
-    dwell_s: f64,
-}
-
-fn read_words(text: &str, line: usize, process: Process) -> Result<Found, JobError> {
-    let mut found = Found::default();
-    let mut dwell = false;
-    let mut p = 0.0;
-    let mut rest = text;
-    while let Some(letter) = rest.chars().next() {
-        let wrong = |word: &str, why| JobError::Word {
-            line,
-            word: word.to_owned(),
-            why,
-        };
-        if !letter.is_ascii_uppercase() {
-            return Err(wrong(rest, "a G-code word begins with a letter"));
-        }
-        let end = rest[1..]
-            .find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | '+' | '-')))
-            .map_or(rest.len(), |n| n + 1);
-        let (word, after) = rest.split_at(end);
-        if !"FGIJKLMNPRSTXYZ".contains(letter) {
-            return Err(wrong(word, "no GRBL controller knows this letter"));
-        }
-        let value: f64 = word[1..]
-            .parse()
-            .map_err(|_| wrong(word, "a letter must be followed by a number"))?;
-        match letter {
-            'G' | 'M' if word.bytes().filter(u8::is_ascii_digit).count() > DIGITS => {
-                return Err(wrong(
-                    word,
-                    "a command has a number of so many digits that the controller reads another one",
-                ));
-            }
-            // The firmware keeps the whole part in a byte: M259 is M3.
-            'G' | 'M' if !(0.0..256.0).contains(&value) => {
-                return Err(wrong(word, "commands are numbered from 0 to 255"));
-            }
-            // And rounds the fraction to hundredths: M3.004 is M3.
-            'M' if value.fract() != 0.0 => {
-                return Err(wrong(word, "M commands are whole numbers"));
-            }
-            'G' if value == 10.0 || value == 28.1 || value == 30.1 => {
-                return Err(wrong(
-                    word,
-                    "this writes the controller's memory, and while it writes it loses what is sent: set the origin before the job, not in it",
-                ));
-            }
-            // With its height control, a torch feels for the sheet before each cut.
-            'G' if process == Process::Plasma && [38.2, 38.3, 38.4, 38.5].contains(&value) => {}
-            'G' if value.trunc() == 38.0 => {
-                return Err(wrong(
-                    word,
-                    "a laser has no probe, and a job must not move until something is touched",
-                ));
-            }
-            'G' if value.fract() != 0.0 && ![43.1, 61.1, 91.1, 92.1].contains(&value) => {
-                return Err(wrong(word, "no GRBL controller knows this command"));
-            }
-            'M' => {
-                found.m3 |= value == 3.0;
-                found.on |= value == 3.0 || value == 4.0;
-                found.off |= value == 5.0 || value == 2.0 || value == 30.0;
-            }
-            'G' => dwell |= value == 4.0,
-            'S' => found.s = value,
-            'P' => p = value.max(p),
-            _ => {}
-        }
-        rest = after;
-    }
-    if dwell {
-        found.dwell_s = p;
-    }
-    Ok(found)
 }
 
 #[cfg(test)]
