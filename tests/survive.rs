@@ -236,6 +236,7 @@ impl World {
         let zero = self.zero_mm();
         match question {
             Question::Home => true,
+            Question::TorchClear { .. } => head[2] > SURFACE_MM + 5.0,
             Question::ZeroHere { .. } => {
                 let up = match self.process {
                     Process::Laser => 0.0,

@@ -9,8 +9,8 @@ use std::time::Duration;
 use kagome::base::progress::{Progress, Silent};
 use kagome::control::journal::{Header, Journal, MemoryStore};
 use kagome::control::{
-    Change, Cuts, Glance, Job, JobError, JobRules, Operator, Proof, SendError, SendOptions,
-    SendReport, StopReason, Transport, Wish, resume, send, send_recorded,
+    Change, Cuts, Glance, Job, JobError, JobRules, Operator, Proof, Question, SendError,
+    SendOptions, SendReport, StopReason, Transport, Wish, resume, send, send_recorded,
 };
 use kagome::material::Process;
 use kagome::sim::{At, Controller, Faults, Flavour, Mishap, Settings, SimTransport};
@@ -218,6 +218,14 @@ fn without_the_word_for_it_no_torch_is_streamed() {
         assert_eq!(error, JobError::Arc { line: 5 });
         assert!(error.to_string().contains("accept_arc_on_after_lost_link"));
     }
+    // Without S the controller would light nothing, and the head go its way dark.
+    for dark in ["M3", "M3S0"] {
+        let text = text().replace("M3S1000", dark);
+        let error = Job::check(text.as_bytes(), &self::rules()).unwrap_err();
+        assert_eq!(error, JobError::NoOutput { line: 5 });
+    }
+    let text = text().replace("F1500\n", "F1500\nS0\n");
+    assert!(Job::check(text.as_bytes(), &self::rules()).is_err());
     // A laser still has no probe.
     let probe = b"G21G90\nG38.2Z-5F100\nM5\n";
     assert!(matches!(
@@ -429,8 +437,8 @@ fn a_stop_at_any_moment_is_dark_and_keeps_the_position() {
 /// Sees how high the torch is whenever the head moves dark over the sheet.
 struct Heights<'a> {
     link: &'a Mutex<SimTransport>,
-    /// Where it was at the last look, and the least height so far, mm.
-    seen: Mutex<([f64; 2], f64)>,
+    /// Where it was at the last look and whether it burnt, and the least height so far, mm.
+    seen: Mutex<([f64; 2], bool, f64)>,
 }
 
 impl Progress for Heights<'_> {}
@@ -440,40 +448,54 @@ impl Operator for Heights<'_> {
         let [x, y, z] = link.controller().head_mm();
         let mut seen = self.seen.lock().unwrap();
         let moved = (x - seen.0[0]).hypot(y - seen.0[1]) > 0.01;
-        if moved && !link.controller().beam_on() {
-            seen.1 = seen.1.min(z);
+        let lit = link.controller().beam_on();
+        if moved && !lit && !seen.1 {
+            seen.2 = seen.2.min(z);
         }
-        seen.0 = [x, y];
+        (seen.0, seen.1) = ([x, y], lit);
     }
 }
 
-#[test]
-fn after_a_stop_in_the_kerf_the_torch_is_raised_before_it_travels() {
-    let job = job();
+/// In the middle of the third cut.
+struct StopInCut<'a>(&'a Mutex<SimTransport>);
+impl Progress for StopInCut<'_> {
+    fn interrupted(&self) -> bool {
+        let link = self.0.lock().unwrap();
+        let [x, y, _] = link.controller().head_mm();
+        x > 20.0 && y > 24.0 && link.controller().beam_on()
+    }
+}
+impl Operator for StopInCut<'_> {}
+
+const SURFACE_MM: f64 = -30.0;
+
+/// Stops a job in the kerf and resumes it; gives how low the torch was while it travelled, over the sheet.
+fn stopped_in_the_kerf(flavour: Flavour, zero_by_g92: bool) -> f64 {
+    let text = text().replace("G0Z4\n", "G38.2Z-80F500\nG92Z0\nG0Z4\n");
+    let job = Job::check(text.as_bytes(), &rules()).unwrap();
     let cuts = Cuts::of(&job).unwrap();
     assert_eq!(cuts.len(), SLITS);
     let store = MemoryStore::default();
     let header = Header::of(&job, &cuts, "job.nc", "table", 3);
     let options = SendOptions {
         poll: Duration::from_millis(10),
+        buffer: Some(128),
         ..SendOptions::default()
     };
-    let link = Mutex::new(SimTransport::new(Controller::new(settings(Flavour::Grbl))));
+    let mut machine = Controller::new(Settings {
+        surface_mm: Some(SURFACE_MM),
+        ..settings(flavour)
+    });
+    if zero_by_g92 {
+        machine.write(b"G92X0Y0Z3\n");
+        machine.advance(1.0);
+    }
+    let link = Mutex::new(SimTransport::new(machine));
     let line = || Line {
         link: &link,
         lost: &[],
         doubled: &[],
     };
-    // In the middle of the third cut.
-    struct StopInCut<'a>(&'a Mutex<SimTransport>);
-    impl Progress for StopInCut<'_> {
-        fn interrupted(&self) -> bool {
-            let link = self.0.lock().unwrap();
-            let [x, y, _] = link.controller().head_mm();
-            x > 20.0 && y > 24.0 && link.controller().beam_on()
-        }
-    }
-    impl Operator for StopInCut<'_> {}
     let mut journal = Journal::new(header.clone(), store.clone());
     let error = send_recorded(
         &mut line(),
@@ -485,16 +507,20 @@ fn after_a_stop_in_the_kerf_the_torch_is_raised_before_it_travels() {
     )
     .unwrap_err();
     assert_eq!(error.confirmed().unwrap().proven, 2, "{error}");
-    assert!(link.lock().unwrap().controller().head_mm()[2] < 2.0);
-
     let head = link.lock().unwrap().controller().head_mm();
+    assert!(head[2] < SURFACE_MM + 2.0);
+
     let heights = Heights {
         link: &link,
-        seen: Mutex::new(([head[0], head[1]], f64::INFINITY)),
+        seen: Mutex::new(([head[0], head[1]], false, f64::INFINITY)),
     };
     let bytes = store.bytes();
     let mut journal = Journal::continued(header, &bytes, store).unwrap();
-    let mut ask = |question: &_| panic!("the position is kept: {question:?}");
+    // The position is kept; a zero by G92 that a reset has taken away is put back, and shown.
+    let mut ask = |question: &Question| match question {
+        Question::AtReference { .. } => zero_by_g92,
+        other => panic!("{other:?}"),
+    };
     let report = resume(
         &mut line(),
         &job,
@@ -506,12 +532,89 @@ fn after_a_stop_in_the_kerf_the_torch_is_raised_before_it_travels() {
     )
     .unwrap();
     assert_eq!(report.cuts, SLITS);
-    let lowest_mm = heights.seen.into_inner().unwrap().1;
-    assert!(lowest_mm > 10.0, "{lowest_mm}");
     let (lengths, _) = burnt(link.lock().unwrap().controller());
     for (k, length) in lengths.iter().enumerate() {
         let twice = length - LENGTH_MM;
         assert!(twice > -0.02 && (k == 2 || twice < 0.02), "{lengths:?}");
+    }
+    heights.seen.into_inner().unwrap().2 - SURFACE_MM
+}
+
+#[test]
+fn after_a_stop_in_the_kerf_the_torch_is_raised_before_it_travels() {
+    for flavour in [Flavour::Grbl, Flavour::GrblHal, Flavour::FluidNc] {
+        for zero_by_g92 in [false, true] {
+            let lowest_mm = stopped_in_the_kerf(flavour, zero_by_g92);
+            assert!(lowest_mm > 9.0, "{flavour:?}: {lowest_mm}");
+        }
+    }
+}
+
+/// A table that homes, was only unlocked, and counts its torch close under the upper end: it cannot be raised as it should.
+#[test]
+fn a_torch_that_cannot_be_raised_travels_only_if_the_person_sees_it_clear() {
+    let job = job();
+    let cuts = Cuts::of(&job).unwrap();
+    let header = Header::of(&job, &cuts, "job.nc", "table", 3);
+    for clear in [false, true] {
+        let store = MemoryStore::default();
+        let mut machine = Controller::new(Settings {
+            homing: true,
+            ..settings(Flavour::Grbl)
+        });
+        machine.write(b"$X\nG92Z3\n");
+        machine.advance(1.0);
+        let link = Mutex::new(SimTransport::new(machine));
+        let line = || Line {
+            link: &link,
+            lost: &[],
+            doubled: &[],
+        };
+        let options = SendOptions {
+            poll: Duration::from_millis(10),
+            ..SendOptions::default()
+        };
+        let mut journal = Journal::new(header.clone(), store.clone());
+        send_recorded(
+            &mut line(),
+            &job,
+            &cuts,
+            &options,
+            &StopInCut(&link),
+            &mut journal,
+        )
+        .unwrap_err();
+        let stood = link.lock().unwrap().controller().head_mm();
+        let bytes = store.bytes();
+        let mut journal = Journal::continued(header.clone(), &bytes, store).unwrap();
+        let mut asked = Vec::new();
+        let result = resume(
+            &mut line(),
+            &job,
+            &cuts,
+            &options,
+            &Silent,
+            &mut journal,
+            &mut |question| {
+                asked.push(question.clone());
+                match question {
+                    Question::TorchClear { .. } => clear,
+                    _ => true,
+                }
+            },
+        );
+        let head = link.lock().unwrap().controller().head_mm();
+        if clear {
+            assert_eq!(result.unwrap().cuts, SLITS);
+        } else {
+            let error = result.unwrap_err().to_string();
+            assert!(error.contains("raise it by hand"), "{error}");
+            // But for the step to which it is rounded.
+            assert!((head[0] - stood[0]).hypot(head[1] - stood[1]) < 0.02);
+        }
+        let short =
+            |q: &Question| matches!(q, Question::TorchClear { raised_mm } if *raised_mm < 9.0);
+        assert!(asked.iter().any(short), "{asked:?}, {stood:?}");
     }
 }
 

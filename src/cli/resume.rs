@@ -27,6 +27,9 @@ pub struct ResumeArgs {
     /// If the controller has lost its position and cannot home: the head stands over the job's zero point
     #[arg(long)]
     zero_here: bool,
+    /// If a torch cannot be raised by as much as between two cuts: it hangs clear of the sheet
+    #[arg(long)]
+    torch_clear: bool,
     /// Do not ask whether the head, sent dark to a cut of the sheet, stands over it: it does
     #[arg(long)]
     at_reference: bool,
@@ -38,6 +41,7 @@ impl ResumeArgs {
         let (given, flag) = match question {
             Question::Home => (self.home, "--home"),
             Question::ZeroHere { .. } => (self.zero_here, "--zero-here"),
+            Question::TorchClear { .. } => (self.torch_clear, "--torch-clear"),
             Question::AtReference { .. } => (self.at_reference, "--at-reference"),
         };
         if given {

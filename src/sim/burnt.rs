@@ -177,6 +177,9 @@ impl Light {
     }
 }
 
+/// No output switches so fast, s.
+const INSTANT_S: f64 = 1e-6;
+
 impl Bed {
     /// From now on, at this place, the beam does this. What was open is closed.
     pub fn light(&mut self, now_s: f64, at: [f64; 3], light: Light) {
@@ -184,7 +187,9 @@ impl Bed {
         if let Some(mut burn) = self.open.take() {
             burn.to_mm = at;
             burn.end_s = now_s;
-            if burn.end_s > burn.start_s {
+            // A change in the very moment of another leaves a trace of nothing.
+            let least_s = if burn.standing() { INSTANT_S } else { 0.0 };
+            if burn.end_s - burn.start_s > least_s {
                 self.burns.push(burn);
             }
         }

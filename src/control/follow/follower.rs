@@ -76,6 +76,14 @@ impl<'a> Follower<'a> {
         self.last = None;
     }
 
+    /// As [`Follower::sighted`], but proves nothing.
+    pub fn looked_up(&mut self, at_mm: [f64; 2], sent: usize) -> Sighting {
+        let before = std::mem::replace(&mut self.at_rest_only, true);
+        let sighting = self.sighted(at_mm, sent);
+        (self.at_rest_only, self.last) = (before, None);
+        sighting
+    }
+
     /// A report shows the head at `at_mm`, work coordinates, when no more than the first `sent` lines of the job had been
     /// sent.
     pub fn sighted(&mut self, at_mm: [f64; 2], sent: usize) -> Sighting {

@@ -104,6 +104,14 @@ pub enum JobError {
         /// Line number, from 1.
         line: usize,
     },
+    /// A torch that is switched on with no S above 0.
+    #[error(
+        "line {line} switches the torch on without power (S): the controller switches its output only for an S above 0, so the head would go its way dark. Write M3 S1000, or what $30 is on the table. Nothing was sent"
+    )]
+    NoOutput {
+        /// Line number, from 1.
+        line: usize,
+    },
     /// The last word on the beam is "on".
     #[error(
         "line {line} switches the beam on and nothing after it switches it off: end the job with M5. Nothing was sent"

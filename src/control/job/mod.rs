@@ -77,6 +77,7 @@ impl Job {
             line_limit: rules.line_limit,
         };
         let mut beam_on = None;
+        let mut s = 0.0;
         let mut rows = text.split(|&b| b == b'\n').enumerate().peekable();
         while let Some((index, row)) = rows.next() {
             let line = index + 1;
@@ -119,6 +120,10 @@ impl Job {
                 }
                 job.constant_power = true;
             }
+            s = found.s.unwrap_or(s);
+            if job.is_torch() && s <= 0.0 && (found.on || found.s.is_some() && beam_on.is_some()) {
+                return Err(JobError::NoOutput { line });
+            }
             if found.dwell_s > LONGEST_DWELL_S {
                 return Err(JobError::Dwell {
                     line,
@@ -131,7 +136,7 @@ impl Job {
             } else if found.on {
                 beam_on = Some(line);
             }
-            job.largest_s = job.largest_s.max(found.s);
+            job.largest_s = job.largest_s.max(found.s.unwrap_or(0.0));
             job.longest_dwell_s = job.longest_dwell_s.max(found.dwell_s);
             job.lines.push((job.text.len(), line));
         }
@@ -204,6 +209,11 @@ impl Job {
     /// True if the job uses M3.
     pub fn constant_power(&self) -> bool {
         self.constant_power
+    }
+
+    /// What M3 and M4 switch.
+    pub(super) fn process(&self) -> Process {
+        self.process
     }
 
     /// True if it drives a torch, on a controller without laser mode.

@@ -39,7 +39,7 @@ pub(super) struct Found {
     pub m3: bool,
     pub on: bool,
     pub off: bool,
-    pub s: f64,
+    pub s: Option<f64>,
     pub dwell_s: f64,
 }
 
@@ -105,7 +105,7 @@ pub(super) fn read_words(text: &str, line: usize, process: Process) -> Result<Fo
                 found.off |= value == 5.0 || value == 2.0 || value == 30.0;
             }
             'G' => dwell |= value == 4.0,
-            'S' => found.s = value,
+            'S' => found.s = Some(value),
             'P' => p = value.max(p),
             _ => {}
         }

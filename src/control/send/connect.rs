@@ -58,6 +58,11 @@ impl Facts {
         })
     }
 
+    /// grblHAL: how long a spindle gets to run up after a hold, s (`$392`).
+    pub(super) fn run_up_s(&self) -> Option<f64> {
+        self.settings.get(&392).copied()
+    }
+
     /// How far it leaves its limit switches when it homes, mm.
     pub(super) fn pull_off_mm(&self) -> f64 {
         let way = self.settings.get(&27).copied().unwrap_or(1.0);
@@ -382,7 +387,7 @@ impl Sender<'_> {
         if rounding_mm > COARSEST_MM {
             return Err(SendError::NotReady {
                 why: format!(
-                    "the controller tells its position in steps of {} mm, so nobody can say which cuts are made: let it report millimetres ($13=0), or send the job with --no-journal",
+                    "the controller tells its position in steps of {} mm, so nobody can say which cuts are made: let it report millimetres ($13=0)",
                     short(2.0 * status.rounding_mm, 2)
                 ),
             });

@@ -25,8 +25,9 @@ pub(super) const DOOR: u8 = 0x84;
 /// report that tells. GRBL tells a change in the next report or the one after it, and everything in every twentieth.
 const STILL_ON: Duration = Duration::from_millis(300);
 const UNTOLD: Duration = Duration::from_secs(1);
-/// How long a resumed controller may stand with the torch on: GRBL's time for a spindle behind the door, and grblHAL's after
-/// every hold, is 4 s as it comes.
+/// How long a resumed controller may tell Hold with the torch on: the way of a byte and a report, and where the firmware gives
+/// a spindle time to run up after every hold, as grblHAL does, that time.
+const ON_ITS_WAY: Duration = Duration::from_millis(300);
 const RUN_UP: Duration = Duration::from_millis(5500);
 /// How often the status is asked for until it is dark.
 pub(super) const DARK_POLL: Duration = Duration::from_millis(25);
@@ -53,9 +54,38 @@ enum Step {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Watch {
     step: Step,
+    /// It brakes, or was just told to.
+    braking: bool,
+    /// How long it may stand lit once it was resumed, s; none where the controller does not tell.
+    run_up_s: Option<f64>,
+    /// It is grblHAL.
+    hal: bool,
 }
 
 impl Watch {
+    /// Of this controller.
+    pub fn of(firmware: &str, run_up_s: Option<f64>) -> Self {
+        Self {
+            hal: firmware.to_ascii_lowercase().contains("grblhal"),
+            run_up_s,
+            ..Self::default()
+        }
+    }
+
+    fn run_up(self) -> Duration {
+        let told = self.run_up_s.map(|s| s.clamp(0.0, 60.0));
+        match told {
+            Some(s) => Duration::from_secs_f64(s) + ON_ITS_WAY,
+            None if self.hal => RUN_UP,
+            None => ON_ITS_WAY,
+        }
+    }
+
+    /// The person pauses it.
+    pub fn paused(&mut self) {
+        (self.step, self.braking) = (Step::Moving, true);
+    }
+
     /// The person resumes it.
     pub fn resumed(&mut self, now: Duration) {
         if self.step == Step::Dark {
@@ -65,10 +95,11 @@ impl Watch {
 
     /// The machine is held, and it is not known yet that its output is off.
     pub fn is_waiting(self) -> bool {
-        matches!(
-            self.step,
-            Step::Standing(_) | Step::Stopped(_) | Step::Door(_)
-        )
+        self.braking
+            || matches!(
+                self.step,
+                Step::Standing(_) | Step::Stopped(_) | Step::Door(_)
+            )
     }
 }
 
@@ -91,18 +122,21 @@ impl Sender<'_> {
         let door = match status.state {
             MachineState::Hold(true) => false,
             MachineState::Door(true) => true,
-            _ => {
-                self.watch = Watch::default();
+            state => {
+                self.watch.step = Step::Moving;
+                self.watch.braking =
+                    matches!(state, MachineState::Hold(false) | MachineState::Door(false));
                 return Ok(());
             }
         };
+        self.watch.braking = false;
         let now = self.now();
         let late = |since: Duration, than: Duration| now.saturating_sub(since) > than;
         let lit = status.lit();
         let next = match (self.watch.step, lit) {
             (Step::Dark, Some(false) | None) => return Ok(()),
             // grblHAL lights the torch and tells Hold for as long as a spindle gets to run up.
-            (Step::Resumed(since), _) if !late(since, RUN_UP) => return Ok(()),
+            (Step::Resumed(since), _) if !late(since, self.watch.run_up()) => return Ok(()),
             (_, Some(false)) => {
                 self.progress
                     .note("the machine tells that the torch is off while it is paused");

@@ -226,6 +226,7 @@ impl<'a> Sender<'a> {
     fn run(mut self, facts: &Facts) -> Result<SendReport, SendError> {
         self.link.unit_mm = facts.unit_mm;
         self.offset_mm = facts.offset_mm;
+        self.watch = Watch::of(&facts.firmware, facts.run_up_s());
         if let Some(cuts) = self.cuts {
             let start = self.work_mm(facts.position_mm.as_ref());
             self.follower = Some(Follower::new(cuts, start, facts.tolerance_mm));

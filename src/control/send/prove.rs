@@ -16,6 +16,8 @@ const FORGIVEN: f64 = 0.1;
 /// From so much doubt on, the controller's reports are coarser than their decimals, and where they show the head proves
 /// nothing. Damaged ones are rarer.
 const COARSE: f64 = 3.0;
+/// And above this one they prove nothing for the moment.
+const DOUBTED: f64 = 0.5;
 
 impl Sender<'_> {
     /// Where a report shows the head, work coordinates, mm.
@@ -88,6 +90,10 @@ impl Sender<'_> {
         );
         let at = self.work_mm(Some(status)).filter(|_| in_job)?;
         let follower = self.follower.as_mut()?;
+        // While a report a little off the way is fresh, the others may be rounded as well.
+        if self.doubt > DOUBTED {
+            return Some(follower.looked_up(at, self.sent));
+        }
         Some(follower.sighted(at, self.sent))
     }
 

@@ -17,6 +17,7 @@ use crate::control::journal::{History, Journal};
 use crate::control::operator::Operator;
 use crate::control::reply::{MachineState, Reply};
 use crate::control::{Job, JobRules, Transport};
+use crate::material::Process;
 
 /// What only the person can know or allow.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +29,11 @@ pub enum Question {
     ZeroHere {
         /// It is a torch.
         torch: bool,
+    },
+    /// A torch that may hang in the cut can be raised only so far before it travels: does it hang clear of the sheet?
+    TorchClear {
+        /// How far, mm.
+        raised_mm: f64,
     },
     /// The head was moved, dark, to where a cut begins: does it stand over that?
     AtReference {
@@ -54,6 +60,11 @@ impl std::fmt::Display for Question {
                 } else {
                     ""
                 }
+            ),
+            Self::TorchClear { raised_mm } => write!(
+                f,
+                "the torch was raised by {} mm, to the upper end of its travel as the controller counts it, and travels over the sheet now. Does it hang clear of the sheet and of everything on it",
+                short(*raised_mm, 1)
             ),
             Self::AtReference { cut, is_cut, at_mm } => write!(
                 f,
@@ -120,22 +131,17 @@ pub fn resume(
             .max_unconfirmed()
             .max(history.header.max_unconfirmed),
     };
-    let (facts, sure) = sender.find(&place, answer)?;
+    let (facts, settled) = sender.find(&place, answer)?;
     drop(sender);
-    if sure && let Some(lift) = lift_mm(job, options, &facts) {
-        // It may hang in the kerf, and the way to the next cut goes over the sheet.
-        let text = format!(
-            "M5\nG21G90G17G94{}\nG91\nG0Z{}\nG90\n",
-            facts.system,
-            short(lift, 3)
-        );
-        progress.note("the torch is raised first");
-        go_dark(transport, &text, &facts, (options, progress))?;
+    if job.is_torch() && settled != Settled::Anew {
+        // It may hang in the kerf, and the way from here goes over the sheet.
+        raise(transport, &facts, (options, progress), answer)?;
     }
-    if !sure {
+    if settled != Settled::Sure {
         let (cut, is_cut) = (history.proven.saturating_sub(1), history.proven > 0);
         visit(
             transport,
+            job.process(),
             cuts,
             (cut, is_cut),
             &facts,
@@ -161,6 +167,7 @@ pub fn resume(
 /// The head goes dark to where a cut begins, and the person looks.
 fn visit(
     transport: &mut dyn Transport,
+    process: Process,
     cuts: &Cuts,
     (cut, is_cut): (usize, bool),
     facts: &Facts,
@@ -179,7 +186,7 @@ fn visit(
         short(at_mm[1], 4)
     );
     progress.note("the head goes to a point of the job with the beam off");
-    go_dark(transport, &text, facts, (options, progress))?;
+    go_dark(transport, &text, process, facts, (options, progress))?;
     if answer(&Question::AtReference { cut, is_cut, at_mm }) {
         return Ok(());
     }
@@ -192,35 +199,66 @@ fn visit(
 fn go_dark(
     transport: &mut dyn Transport,
     text: &str,
+    process: Process,
     facts: &Facts,
     (options, progress): (&SendOptions, &dyn Operator),
 ) -> Result<(), SendError> {
-    let way =
-        Job::check(text.as_bytes(), &JobRules::default()).map_err(|error| SendError::NotReady {
-            why: error.to_string(),
-        })?;
+    let rules = JobRules {
+        process,
+        ..JobRules::default()
+    };
+    let way = Job::check(text.as_bytes(), &rules).map_err(|error| SendError::NotReady {
+        why: error.to_string(),
+    })?;
     Sender::new(transport, &way, options, progress).run(facts)?;
     Ok(())
 }
 
-/// How far a torch is raised before it travels, mm: as far as between two cuts, but not beyond the upper end of its travel,
-/// where that is known. None if there is nothing to raise.
-fn lift_mm(job: &Job, options: &SendOptions, facts: &Facts) -> Option<f64> {
+/// A torch is raised before it travels: as far as between two cuts, but not beyond the upper end of its travel, where that is
+/// known; if that is less, the person looks.
+fn raise(
+    transport: &mut dyn Transport,
+    facts: &Facts,
+    (options, progress): (&SendOptions, &dyn Operator),
+    answer: &mut dyn FnMut(&Question) -> bool,
+) -> Result<(), SendError> {
     /// Where the profile does not say.
     const LIFT_MM: f64 = 10.0;
-    if !job.is_torch() {
-        return None;
-    }
     let machine = options.made_for.as_deref().map(|(machine, _)| machine);
-    let lift = machine
+    let wanted = machine
         .and_then(|m| m.plasma()?.safe_height_mm)
         .unwrap_or(LIFT_MM);
     // A homed Z axis ends at 0, less the way by which it leaves its switch ($27).
-    let room = facts.height_mm().filter(|_| facts.homes).map(|z| {
-        let end = -facts.pull_off_mm();
-        if z <= 0.0 { (end - z).max(0.0) } else { lift }
-    });
-    Some(room.map_or(lift, |room| lift.min(room))).filter(|lift| *lift > 0.0)
+    let room = facts.height_mm().filter(|z| facts.homes && *z <= 0.0);
+    let lift = room.map_or(wanted, |z| wanted.min((-facts.pull_off_mm() - z).max(0.0)));
+    if lift > 0.0 {
+        let text = format!(
+            "M5\nG21G90G17G94{}\nG91\nG0Z{}\nG90\n",
+            facts.system,
+            short(lift, 3)
+        );
+        progress.note("the torch is raised first");
+        let who = (options, progress);
+        go_dark(transport, &text, Process::Plasma, facts, who)?;
+    }
+    if lift < wanted && !answer(&Question::TorchClear { raised_mm: lift }) {
+        return Err(SendError::NotReady {
+            why: "the torch may hang in the sheet: raise it by hand (kagome jog --z 10), and resume again. The torch was never on"
+                .into(),
+        });
+    }
+    Ok(())
+}
+
+/// What is settled of where the head stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Settled {
+    /// It stands where it was left, and its place and the job's zero are certain.
+    Sure,
+    /// It stands where it was left, but the zero was put back: it is to be shown.
+    ZeroPutBack,
+    /// It was homed, or moved by hand: it is to be shown.
+    Anew,
 }
 
 /// What the journal says of where the head may be.
@@ -253,12 +291,12 @@ impl Place<'_> {
 }
 
 impl Sender<'_> {
-    /// Settles where the head stands. Second: whether that is certain; else it is to be shown.
+    /// Settles where the head stands.
     fn find(
         &mut self,
         place: &Place<'_>,
         answer: &mut dyn FnMut(&Question) -> bool,
-    ) -> Result<(Facts, bool), SendError> {
+    ) -> Result<(Facts, Settled), SendError> {
         let found = self.settle_down()?;
         let (firmware, stood) = match found {
             Found::Anew(banner) => (banner, false),
@@ -274,8 +312,7 @@ impl Sender<'_> {
         facts.system.clone_from(&place.history.begin.system);
         self.locate(&mut facts)?;
         let then = place.history.begin.offset_mm;
-        // Of a laser the height does not matter.
-        let axes = if self.job.is_torch() { 3 } else { 2 };
+        let axes = if self.minds_height() { 3 } else { 2 };
         let moved = |now: [f64; 3]| (0..axes).any(|k| (now[k] - then[k]).abs() > SAME_MM);
         let same_zero = !moved(facts.offset_mm);
         let machine_mm = facts
@@ -285,7 +322,7 @@ impl Sender<'_> {
         let kept =
             stood && !locked && machine_mm.is_some_and(|at| place.is_kept(at, facts.tolerance_mm));
         if kept && same_zero {
-            return Ok((facts, true));
+            return Ok((facts, Settled::Sure));
         }
         let refused = |why: &str| SendError::NotReady { why: why.into() };
         if kept {
@@ -324,7 +361,17 @@ impl Sender<'_> {
             self.set_zero(&mut facts, None)?;
         }
         self.survey_travel(&facts)?;
-        Ok((facts, false))
+        let settled = if kept {
+            Settled::ZeroPutBack
+        } else {
+            Settled::Anew
+        };
+        Ok((facts, settled))
+    }
+
+    /// Whether the height of the zero point matters: not of a laser, and not where the job feels for the sheet.
+    fn minds_height(&self) -> bool {
+        self.job.is_torch() && !self.job.probes()
     }
 
     fn machine_of(&mut self, status: &super::Status, facts: &Facts) -> Option<[f64; 3]> {
@@ -342,7 +389,7 @@ impl Sender<'_> {
         let zero = zero_mm.unwrap_or(at);
         let word = |k: usize| short(at[k] - zero[k], 4);
         // A height that nobody has lost is kept as well; where the person shows the place, the job feels for it.
-        let height = if self.job.is_torch() && zero_mm.is_some() {
+        let height = if self.minds_height() && zero_mm.is_some() {
             format!("Z{}", word(2))
         } else {
             String::new()
@@ -419,6 +466,12 @@ impl Sender<'_> {
                     Reply::Status(status) => {
                         quiet_until = self.now() + self.options.silence;
                         match status.state {
+                            // An arc that stands is put out by the reset that comes next.
+                            MachineState::Idle
+                                if self.job.is_torch() && status.lit() == Some(true) =>
+                            {
+                                return Ok(Found::Standing);
+                            }
                             MachineState::Idle => standing += 1,
                             MachineState::Alarm => return Ok(Found::Lost),
                             MachineState::Run
@@ -443,9 +496,14 @@ impl Sender<'_> {
                                         .send(&[DOOR])
                                         .map_err(|source| self.connect_error(source))?;
                                 }
+                                let then = if self.job.is_torch() {
+                                    "reset it (to let it go on would light the torch where it stands)"
+                                } else {
+                                    "close its door, or reset it"
+                                };
                                 return Err(SendError::NotReady {
                                     why: format!(
-                                        "the machine is paused ({:?}): close its door, or reset it, and resume again",
+                                        "the machine is paused ({:?}): {then}, and resume again",
                                         status.state
                                     ),
                                 });

@@ -189,7 +189,9 @@ impl Sender<'_> {
                             self.sight(&status);
                         }
                         self.status = Some(status);
-                        running = state == MachineState::Run;
+                        // GRBL tells Idle while a torch waits in its pierce.
+                        running = state == MachineState::Run
+                            || state == MachineState::Idle && self.job.is_torch();
                         match state {
                             MachineState::Hold(true) | MachineState::Door(true) => {
                                 return Ok((true, undisturbed));

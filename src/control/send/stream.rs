@@ -106,8 +106,10 @@ impl Sender<'_> {
                     continue;
                 }
                 self.link.send(&[wish.byte()])?;
-                if wish == Wish::Resume {
-                    self.watch.resumed(self.now());
+                match wish {
+                    Wish::Resume => self.watch.resumed(self.now()),
+                    Wish::Pause if self.job.is_torch() => self.watch.paused(),
+                    _ => {}
                 }
             }
             let before = self.sent;
@@ -165,6 +167,11 @@ impl Sender<'_> {
                     let asked = asked_at.take();
                     let state = status.state;
                     let lit = self.lit_at_end(&status);
+                    // An arc that stands with nothing to follow is not waited for so long.
+                    let hurry = match lit {
+                        Some(true) if self.job.is_torch() => Duration::from_secs(2),
+                        _ => Duration::ZERO,
+                    };
                     rests = match asked_rested && asked.is_some() && state == MachineState::Idle {
                         true => rests + 1,
                         false => 0,
@@ -229,7 +236,7 @@ impl Sender<'_> {
                     }
                     if all_answered {
                         next_poll = self.now();
-                    } else if self.now().saturating_sub(since) > patience {
+                    } else if self.now().saturating_sub(since) > patience.saturating_sub(hurry) {
                         return Err(Trouble::Stop(StopReason::Ledger(format!(
                             "the machine is idle but {} lines were never answered",
                             self.ledger.len()

@@ -73,7 +73,12 @@ impl Controller {
         let locked = matches!(self.state, State::Alarm | State::Critical | State::Sleep);
         // GRBL answers the line that waited, on its way out of it: an ok for what was never done.
         let waited = self.answer.take();
+        let g92 = self.modal.g92;
         self.restart();
+        if self.settings.flavour == Flavour::GrblHal {
+            // Forgotten with the power only.
+            self.modal.g92 = g92;
+        }
         if lost {
             self.raise(3);
         }
