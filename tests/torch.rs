@@ -1,7 +1,11 @@
 //! A torch on a controller without laser mode: held, it must go dark, and a stop must be proven by what is switched on.
 //! Judged by the sheet of the simulated machine, and by how long it burnt where it stood.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests fail by panicking"
+)]
 
 use std::sync::Mutex;
 use std::time::Duration;
@@ -596,7 +600,7 @@ fn a_torch_that_cannot_be_raised_travels_only_if_the_person_sees_it_clear() {
             &Silent,
             &mut journal,
             &mut |question| {
-                asked.push(question.clone());
+                asked.push(*question);
                 match question {
                     Question::TorchClear { .. } => clear,
                     _ => true,

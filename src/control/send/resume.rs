@@ -82,6 +82,8 @@ impl std::fmt::Display for Question {
 const SETTLE_POLL: Duration = Duration::from_millis(200);
 /// Idle reports before a machine counts as one that did not start anew when its port was opened.
 const SETTLED: u32 = 3;
+/// A longer dwell in the job is not waited for, s: the arc may be on.
+const LONGEST_WAIT_S: f64 = 10.0;
 /// How long homing may take.
 const HOMING: Duration = Duration::from_secs(180);
 /// How far a machine at rest may be from where it was left, beyond rounding: nothing.
@@ -447,6 +449,9 @@ impl Sender<'_> {
         let mut quiet_until = self.now() + self.options.banner_wait;
         let mut standing = 0;
         let mut told = false;
+        // GRBL tells Idle while it waits in the middle of a job, as a torch does in its pierce.
+        let waits = self.job.longest_dwell_s().min(LONGEST_WAIT_S) / SETTLE_POLL.as_secs_f64();
+        let settled = SETTLED.max(waits.ceil() as u32 + 2);
         loop {
             self.check_interrupted()?;
             self.link
@@ -466,12 +471,6 @@ impl Sender<'_> {
                     Reply::Status(status) => {
                         quiet_until = self.now() + self.options.silence;
                         match status.state {
-                            // An arc that stands is put out by the reset that comes next.
-                            MachineState::Idle
-                                if self.job.is_torch() && status.lit() == Some(true) =>
-                            {
-                                return Ok(Found::Standing);
-                            }
                             MachineState::Idle => standing += 1,
                             MachineState::Alarm => return Ok(Found::Lost),
                             MachineState::Run
@@ -513,7 +512,7 @@ impl Sender<'_> {
                     _ => {}
                 }
             }
-            if standing >= SETTLED {
+            if standing >= settled {
                 return Ok(Found::Standing);
             }
             if self.now() >= quiet_until && standing == 0 {
