@@ -83,7 +83,10 @@ impl Watch {
 
     /// The person pauses it.
     pub fn paused(&mut self) {
-        (self.step, self.braking) = (Step::Moving, true);
+        // In one that is dark already a pause changes nothing.
+        if matches!(self.step, Step::Moving | Step::Resumed(_)) {
+            (self.step, self.braking) = (Step::Moving, true);
+        }
     }
 
     /// The person resumes it.
