@@ -3,7 +3,9 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+mod stop_after;
+
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use kagome::base::progress::{Progress, Silent};
@@ -16,6 +18,7 @@ use kagome::sim::{
     At, Burn, Controller, Faults, Mishap, Settings, SimTransport, State, rehearse, strokes,
 };
 use proptest::prelude::*;
+use stop_after::StopAfter;
 
 /// Slits as a job, with M4.
 fn job_of(cuts: &[[[f64; 2]; 2]]) -> String {
@@ -237,22 +240,6 @@ fn pauses_and_overrides_change_the_time_and_nothing_else() {
     assert!(back < slow, "{back} {slow}");
 }
 
-/// Asks to stop after this many answers.
-struct StopAfter(AtomicUsize);
-
-impl Progress for StopAfter {
-    fn advance(&self, _: u64) {
-        let _ = self
-            .0
-            .fetch_update(Ordering::SeqCst, Ordering::SeqCst, |n| n.checked_sub(1));
-    }
-    fn interrupted(&self) -> bool {
-        self.0.load(Ordering::SeqCst) == 0
-    }
-}
-
-impl Operator for StopAfter {}
-
 #[test]
 fn ctrl_c_stops_the_machine_with_proof_and_keeps_its_position() {
     let cuts = slits(40);
@@ -263,7 +250,7 @@ fn ctrl_c_stops_the_machine_with_proof_and_keeps_its_position() {
             &mut link,
             &checked(&text),
             &SendOptions::default(),
-            &StopAfter(AtomicUsize::new(after)),
+            &StopAfter::new(after),
         );
         let Err(SendError::Stopped { reason, confirmed }) = result else {
             panic!("{result:?}");
@@ -454,7 +441,7 @@ fn a_panic_while_sending_puts_the_beam_out() {
     let mut link = SimTransport::new(machine());
     let text = job_of(&slits(30));
     let job = checked(&text);
-    let progress = Panics(StopAfter(AtomicUsize::new(25)));
+    let progress = Panics(StopAfter::new(25));
     let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
         send(&mut link, &job, &SendOptions::default(), &progress)
     }));
@@ -611,7 +598,7 @@ mod pty {
                 poll: Duration::from_millis(20),
                 ..SendOptions::default()
             },
-            &StopAfter(AtomicUsize::new(60)),
+            &StopAfter::new(60),
         );
         let Err(SendError::Stopped { confirmed, .. }) = result else {
             panic!("{result:?}");

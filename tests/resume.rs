@@ -6,8 +6,9 @@
     reason = "helpers of tests fail by panicking"
 )]
 
+mod stop_after;
+
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use kagome::base::progress::{Progress, Silent};
 use kagome::control::journal::{Header, History, Journal, MemoryStore};
@@ -16,6 +17,7 @@ use kagome::control::{
     StopReason, Streaming, resume, send_recorded,
 };
 use kagome::sim::{At, Controller, Faults, Mishap, Settings, SimTransport};
+use stop_after::StopAfter;
 
 fn text(n: usize) -> String {
     let mut text = String::from("G21G90\nM4S500\nG1F3000\n");
@@ -96,22 +98,6 @@ fn machine(settings: Settings) -> SimTransport {
     SimTransport::new(Controller::new(settings))
 }
 
-/// Asks to stop after this many answers.
-struct StopAfter(AtomicUsize);
-
-impl Progress for StopAfter {
-    fn advance(&self, _: u64) {
-        let _ = self
-            .0
-            .fetch_update(Ordering::SeqCst, Ordering::SeqCst, |n| n.checked_sub(1));
-    }
-    fn interrupted(&self) -> bool {
-        self.0.load(Ordering::SeqCst) == 0
-    }
-}
-
-impl Operator for StopAfter {}
-
 fn stopped(result: Result<SendReport, SendError>) -> (StopReason, Confirmed) {
     match result {
         Err(SendError::Stopped { reason, confirmed }) => (reason, *confirmed),
@@ -123,7 +109,7 @@ fn stopped(result: Result<SendReport, SendError>) -> (StopReason, Confirmed) {
 fn after_ctrl_c_the_job_goes_on_where_it_stood_and_nobody_is_asked() {
     let bench = Bench::new(30);
     let mut link = machine(Settings::default());
-    let (reason, confirmed) = stopped(bench.send(&mut link, &StopAfter(AtomicUsize::new(30))));
+    let (reason, confirmed) = stopped(bench.send(&mut link, &StopAfter::new(30)));
     assert_eq!(reason, StopReason::Interrupted);
     assert!(confirmed.proven > 2 && confirmed.cuts == 30, "{confirmed}");
     assert!(matches!(bench.history().stopped, Some(Some(_))));
@@ -233,7 +219,7 @@ fn a_panic_is_stopped_with_proof_and_can_be_resumed() {
     impl Operator for Panics {}
     let bench = Bench::new(30);
     let mut link = machine(Settings::default());
-    let progress = Panics(StopAfter(AtomicUsize::new(30)), Mutex::default());
+    let progress = Panics(StopAfter::new(30), Mutex::default());
     let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
         bench.send(&mut link, &progress)
     }));
@@ -262,7 +248,7 @@ fn reports_of_every_form_prove_cuts() {
         controller.advance(2.0);
         controller.read(&mut Vec::new());
         let mut link = SimTransport::new(controller);
-        let (_, confirmed) = stopped(bench.send(&mut link, &StopAfter(AtomicUsize::new(30))));
+        let (_, confirmed) = stopped(bench.send(&mut link, &StopAfter::new(30)));
         assert!(
             confirmed.proven >= 8,
             "$10={mask} $13={inches}: {confirmed}"

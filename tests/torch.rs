@@ -62,6 +62,17 @@ struct Line<'a> {
     doubled: &'a [u8],
 }
 
+impl<'a> Line<'a> {
+    /// One that carries everything.
+    fn good(link: &'a Mutex<SimTransport>) -> Self {
+        Self {
+            link,
+            lost: &[],
+            doubled: &[],
+        }
+    }
+}
+
 impl Transport for Line<'_> {
     fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
         let mut sent = Vec::new();
@@ -405,11 +416,7 @@ fn a_stop_at_any_moment_is_dark_and_keeps_the_position() {
     let mut stopped = 0;
     for k in 0..60 {
         let link = Mutex::new(SimTransport::new(Controller::new(settings(Flavour::Grbl))));
-        let mut line = Line {
-            link: &link,
-            lost: &[],
-            doubled: &[],
-        };
+        let mut line = Line::good(&link);
         let at = 1.0 + 0.217 * f64::from(k);
         let result = send(
             &mut line,
@@ -495,14 +502,9 @@ fn stopped_in_the_kerf(flavour: Flavour, zero_by_g92: bool) -> f64 {
         machine.advance(1.0);
     }
     let link = Mutex::new(SimTransport::new(machine));
-    let line = || Line {
-        link: &link,
-        lost: &[],
-        doubled: &[],
-    };
     let mut journal = Journal::new(header.clone(), store.clone());
     let error = send_recorded(
-        &mut line(),
+        &mut Line::good(&link),
         &job,
         &cuts,
         &options,
@@ -526,7 +528,7 @@ fn stopped_in_the_kerf(flavour: Flavour, zero_by_g92: bool) -> f64 {
         other => panic!("{other:?}"),
     };
     let report = resume(
-        &mut line(),
+        &mut Line::good(&link),
         &job,
         &cuts,
         &options,
@@ -569,18 +571,13 @@ fn a_torch_that_cannot_be_raised_travels_only_if_the_person_sees_it_clear() {
         machine.write(b"$X\nG92Z3\n");
         machine.advance(1.0);
         let link = Mutex::new(SimTransport::new(machine));
-        let line = || Line {
-            link: &link,
-            lost: &[],
-            doubled: &[],
-        };
         let options = SendOptions {
             poll: Duration::from_millis(10),
             ..SendOptions::default()
         };
         let mut journal = Journal::new(header.clone(), store.clone());
         send_recorded(
-            &mut line(),
+            &mut Line::good(&link),
             &job,
             &cuts,
             &options,
@@ -593,7 +590,7 @@ fn a_torch_that_cannot_be_raised_travels_only_if_the_person_sees_it_clear() {
         let mut journal = Journal::continued(header.clone(), &bytes, store).unwrap();
         let mut asked = Vec::new();
         let result = resume(
-            &mut line(),
+            &mut Line::good(&link),
             &job,
             &cuts,
             &options,

@@ -10,6 +10,17 @@ struct Place {
     part: f64,
 }
 
+impl Place {
+    /// What a report that allows it shows.
+    fn sighting(self) -> Sighting {
+        if self.piece == 0 {
+            Sighting::Beginning
+        } else {
+            Sighting::OnTheWay
+        }
+    }
+}
+
 /// What a report showed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sighting {
@@ -41,8 +52,6 @@ pub struct Follower<'a> {
     /// What the last report allowed, seen from `passed`.
     last: Option<Place>,
     proven: usize,
-    /// Reports prove nothing but how far off they are.
-    at_rest_only: bool,
 }
 
 impl<'a> Follower<'a> {
@@ -60,7 +69,6 @@ impl<'a> Follower<'a> {
             },
             last: None,
             proven: 0,
-            at_rest_only: false,
         }
     }
 
@@ -69,72 +77,16 @@ impl<'a> Follower<'a> {
         self.proven
     }
 
-    /// Reports have turned out coarser than the tolerance, so the machine's true place is not always among those allowed.
-    /// From now on only [`Follower::rested`] proves cuts.
-    pub fn prove_at_rest_only(&mut self) {
-        self.at_rest_only = true;
-        self.last = None;
-    }
-
-    /// As [`Follower::sighted`], but proves nothing.
-    pub fn looked_up(&mut self, at_mm: [f64; 2], sent: usize) -> Sighting {
-        let before = std::mem::replace(&mut self.at_rest_only, true);
-        let sighting = self.sighted(at_mm, sent);
-        (self.at_rest_only, self.last) = (before, None);
-        sighting
-    }
-
     /// A report shows the head at `at_mm`, work coordinates, when no more than the first `sent` lines of the job had been
     /// sent.
     pub fn sighted(&mut self, at_mm: [f64; 2], sent: usize) -> Sighting {
-        let end = self.cuts.pieces.partition_point(|p| p.line < sent);
-        if self.start_mm.is_none() && self.passed.piece == 0 {
-            // From an unknown place the way to the first point may cross anything: only its end can be recognised.
-            let first = self.cuts.pieces.first().filter(|_| end > 0);
-            if let Some(first) = first.filter(|p| distance(p.to, at_mm) <= self.tolerance_mm) {
-                self.start_mm = Some(first.to);
+        let found = match self.look(at_mm, sent) {
+            Ok(found) => found,
+            Err(sighting) => {
+                self.last = None;
+                return sighting;
             }
-            return Sighting::Beginning;
-        }
-        if self.passed.piece == end
-            && let Some(last) = end.checked_sub(1)
-        {
-            // Everything sent is done: it waits where that has ended.
-            let by_mm = distance(self.piece(last).to, at_mm);
-            return if by_mm <= self.tolerance_mm {
-                Sighting::OnTheWay
-            } else {
-                Sighting::Astray { by_mm }
-            };
-        }
-        let mut nearest = f64::INFINITY;
-        let mut found = None;
-        for k in self.passed.piece..end {
-            let piece = self.piece(k);
-            let least = if k == self.passed.piece {
-                self.passed.part
-            } else {
-                0.0
-            };
-            match entry(&piece, at_mm, least, self.tolerance_mm) {
-                Ok(part) => {
-                    found = Some(Place { piece: k, part });
-                    break;
-                }
-                Err(by_mm) => nearest = nearest.min(by_mm),
-            }
-        }
-        let Some(found) = found else {
-            self.last = None;
-            return if self.passed.piece == 0 {
-                Sighting::Beginning
-            } else {
-                Sighting::Astray { by_mm: nearest }
-            };
         };
-        if self.at_rest_only {
-            return Sighting::OnTheWay;
-        }
         if let Some(last) = self.last {
             // Both were looked for from the same place, so the earlier of them holds whichever is damaged.
             let both = if last < found { last } else { found };
@@ -144,11 +96,56 @@ impl<'a> Follower<'a> {
             }
         }
         self.last = Some(found);
-        if found.piece == 0 {
+        found.sighting()
+    }
+
+    /// As [`Follower::sighted`], where reports may be coarser than the tolerance, so that the machine's true place is not
+    /// always among those allowed: nothing is proven.
+    pub fn looked_up(&mut self, at_mm: [f64; 2], sent: usize) -> Sighting {
+        self.last = None;
+        self.look(at_mm, sent)
+            .map_or_else(|sighting| sighting, Place::sighting)
+    }
+
+    /// The first place that a report allows.
+    fn look(&mut self, at_mm: [f64; 2], sent: usize) -> Result<Place, Sighting> {
+        let end = self.cuts.pieces.partition_point(|p| p.line < sent);
+        if self.start_mm.is_none() && self.passed.piece == 0 {
+            // From an unknown place the way to the first point may cross anything: only its end can be recognised.
+            let first = self.cuts.pieces.first().filter(|_| end > 0);
+            if let Some(first) = first.filter(|p| distance(p.to, at_mm) <= self.tolerance_mm) {
+                self.start_mm = Some(first.to);
+            }
+            return Err(Sighting::Beginning);
+        }
+        if self.passed.piece == end
+            && let Some(last) = end.checked_sub(1)
+        {
+            // Everything sent is done: it waits where that has ended.
+            let by_mm = distance(self.piece(last).to, at_mm);
+            return Err(if by_mm <= self.tolerance_mm {
+                Sighting::OnTheWay
+            } else {
+                Sighting::Astray { by_mm }
+            });
+        }
+        let mut nearest = f64::INFINITY;
+        for k in self.passed.piece..end {
+            let least = if k == self.passed.piece {
+                self.passed.part
+            } else {
+                0.0
+            };
+            match entry(&self.piece(k), at_mm, least, self.tolerance_mm) {
+                Ok(part) => return Ok(Place { piece: k, part }),
+                Err(by_mm) => nearest = nearest.min(by_mm),
+            }
+        }
+        Err(if self.passed.piece == 0 {
             Sighting::Beginning
         } else {
-            Sighting::OnTheWay
-        }
+            Sighting::Astray { by_mm: nearest }
+        })
     }
 
     /// The machine was seen idle after the first `lines` lines had all been acknowledged, and no more had been sent: all

@@ -56,28 +56,21 @@ pub(super) struct Watch {
     step: Step,
     /// It brakes, or was just told to.
     braking: bool,
-    /// How long it may stand lit once it was resumed, s; none where the controller does not tell.
-    run_up_s: Option<f64>,
-    /// It is grblHAL.
-    hal: bool,
+    /// How long it may stand lit once it was resumed.
+    run_up: Duration,
 }
 
 impl Watch {
-    /// Of this controller.
+    /// Of this controller, that tells how long a spindle gets to run up, or does not.
     pub fn of(firmware: &str, run_up_s: Option<f64>) -> Self {
-        Self {
-            hal: firmware.to_ascii_lowercase().contains("grblhal"),
-            run_up_s,
-            ..Self::default()
-        }
-    }
-
-    fn run_up(self) -> Duration {
-        let told = self.run_up_s.map(|s| s.clamp(0.0, 60.0));
-        match told {
-            Some(s) => Duration::from_secs_f64(s) + ON_ITS_WAY,
-            None if self.hal => RUN_UP,
+        let run_up = match run_up_s {
+            Some(s) => Duration::from_secs_f64(s.clamp(0.0, 60.0)) + ON_ITS_WAY,
+            None if firmware.to_ascii_lowercase().contains("grblhal") => RUN_UP,
             None => ON_ITS_WAY,
+        };
+        Self {
+            run_up,
+            ..Self::default()
         }
     }
 
@@ -139,7 +132,7 @@ impl Sender<'_> {
         let next = match (self.watch.step, lit) {
             (Step::Dark, Some(false) | None) => return Ok(()),
             // grblHAL lights the torch and tells Hold for as long as a spindle gets to run up.
-            (Step::Resumed(since), _) if !late(since, self.watch.run_up()) => return Ok(()),
+            (Step::Resumed(since), _) if !late(since, self.watch.run_up) => return Ok(()),
             (_, Some(false)) => {
                 self.progress
                     .note("the machine tells that the torch is off while it is paused");

@@ -52,16 +52,11 @@ impl Sender<'_> {
         } else {
             self.doubt = (self.doubt - FORGIVEN).max(0.0);
         }
-        if self.doubt >= COARSE
-            && !std::mem::replace(&mut self.coarse, true)
-            && let Some(follower) = &mut self.follower
-        {
-            follower.prove_at_rest_only();
-            if self.journal.is_some() {
-                self.progress.note(
-                    "the controller tells its position more coarsely than it seems, so cuts are proven only when it comes to rest: the machine will stand for a moment every few cuts",
-                );
-            }
+        let newly = self.doubt >= COARSE && !std::mem::replace(&mut self.coarse, true);
+        if newly && self.journal.is_some() {
+            self.progress.note(
+                "the controller tells its position more coarsely than it seems, so cuts are proven only when it comes to rest: the machine will stand for a moment every few cuts",
+            );
         }
         match sighting {
             Some(Sighting::Astray { by_mm }) if by_mm > ASTRAY_MM => {
@@ -91,7 +86,7 @@ impl Sender<'_> {
         let at = self.work_mm(Some(status)).filter(|_| in_job)?;
         let follower = self.follower.as_mut()?;
         // While a report a little off the way is fresh, the others may be rounded as well.
-        if self.doubt > DOUBTED {
+        if self.coarse || self.doubt > DOUBTED {
             return Some(follower.looked_up(at, self.sent));
         }
         Some(follower.sighted(at, self.sent))

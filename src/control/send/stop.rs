@@ -111,21 +111,22 @@ impl Sender<'_> {
         }
         let deadline = self.now() + ANSWER;
         let mut last = None;
-        let mut told_off = !self.job.is_torch();
+        let mut told_off = false;
         while self.now() < deadline {
             self.link.send(b"?")?;
             let until = self.now() + STOP_POLL;
             while let Some(reply) = self.link.reply_before(until)? {
                 if let Reply::Status(status) = reply {
                     let locked = status.state == MachineState::Alarm;
-                    // A torch's board may know no power, but it must tell what is switched on.
-                    match status.lit() {
-                        Some(lit) if self.job.is_torch() => told_off = !lit,
-                        _ => {}
+                    if let Some(lit) = status.lit() {
+                        told_off = !lit;
                     }
-                    let dark = told_off
-                        && (status.dark_and_still()
-                            || self.job.is_torch() && status.is_still() && status.s.is_none());
+                    // A torch's board may know no power, but it must have told what is switched on.
+                    let dark = if self.job.is_torch() {
+                        told_off && status.is_still()
+                    } else {
+                        status.dark_and_still()
+                    };
                     last = Some(format!(
                         "{:?}, power {:?}, output on {:?}",
                         status.state, status.s, status.output_on

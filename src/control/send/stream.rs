@@ -106,10 +106,12 @@ impl Sender<'_> {
                     continue;
                 }
                 self.link.send(&[wish.byte()])?;
-                match wish {
-                    Wish::Resume => self.watch.resumed(self.now()),
-                    Wish::Pause if self.job.is_torch() => self.watch.paused(),
-                    _ => {}
+                if self.job.is_torch() {
+                    match wish {
+                        Wish::Resume => self.watch.resumed(self.now()),
+                        Wish::Pause => self.watch.paused(),
+                        _ => {}
+                    }
                 }
             }
             let before = self.sent;
